@@ -46,6 +46,17 @@ if(RHEC_SANITIZE_THREADS)
   target_link_options(rhec_flags INTERFACE -fsanitize=thread)
 endif()
 
+# What Eigen would compile anew for most sources. Those with precompiled headers know that it is here.
+if(RHEC_PRECOMPILE)
+  add_library(rhec_eigen STATIC "${CMAKE_CURRENT_LIST_DIR}/eigen/compiled_once.cpp")
+  target_compile_features(rhec_eigen PRIVATE cxx_std_20)
+  # Each function apart: a library takes those that it calls.
+  target_compile_options(rhec_eigen PRIVATE $<TARGET_PROPERTY:rhec_flags,INTERFACE_COMPILE_OPTIONS> -ffunction-sections)
+  target_link_options(rhec_eigen INTERFACE -Wl,--gc-sections)
+  target_link_libraries(rhec_eigen PRIVATE Eigen3::Eigen)
+  target_link_libraries(rhec_flags INTERFACE rhec_eigen)
+endif()
+
 # rhec_add_precompiled_headers(NAME): what most sources include, parsed once with the options of this folder. Those of its
 # targets, and of the folders below and after it, that call rhec_precompile have it.
 #   A source includes what it needs all the same: it compiles without these, and clang-tidy reads it so.
@@ -71,7 +82,7 @@ endfunction()
 set(RHEC_COLD_OPTIONS "$<$<CONFIG:Release,RelWithDebInfo>:-O1>")
 set(RHEC_PRECOMPILED_HEADERS
   <algorithm> <array> <charconv> <chrono> <cmath> <filesystem> <fstream> <functional> <map> <memory> <numbers> <optional>
-  <set> <span> <string> <string_view> <utility> <vector> <fmt/format.h> <Eigen/Cholesky> <Eigen/Core>)
+  <set> <span> <string> <string_view> <utility> <vector> <fmt/format.h> "${CMAKE_CURRENT_LIST_DIR}/eigen/compiled_once.hpp")
 # ccache is to know what a precompiled header holds. gcc 12 warns of sums of texts, once std::string is precompiled, that they
 # are written beyond the short texts' place in the object, or onto themselves.
 set(RHEC_PRECOMPILED_OPTIONS "$<$<CXX_COMPILER_ID:GNU>:-fpch-preprocess;-Wno-array-bounds;-Wno-stringop-overflow;-Wno-restrict>")

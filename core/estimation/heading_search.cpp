@@ -5,8 +5,7 @@
 #include <limits>
 #include <numbers>
 
-#include <Eigen/LU>
-
+#include "innovation.hpp"
 #include "rhec/core/base/angle.hpp"
 
 namespace rhec {
@@ -58,7 +57,7 @@ bool HeadingSearch::update(const std::vector<Sensor>& sensors, const double* out
       if (!heading.filter.innovation(sensor, outputs, innovation_)) continue;
       if (innovation_.nis > chi_square_limit(static_cast<int>(innovation_.value.size()), gate_)) heading.explained = 0;
       const double surprise = std::min(innovation_.nis, most_surprise * static_cast<double>(innovation_.value.size()));
-      heading.log_likelihood -= 0.5 * (surprise + std::log(innovation_.covariance.determinant()));
+      heading.log_likelihood -= 0.5 * (surprise + log_determinant(innovation_.covariance));
     }
     heading.filter.update(outputs);
   }

@@ -61,7 +61,7 @@ PlaceSmoother::PlaceSmoother(const std::shared_ptr<const Model>& model, const Pr
        {&covariance_, &next_covariance_, &filtered_covariance_, &predicted_, &transition_, &across_, &gain_, &scaled_})
     M->setZero(n_, n_);
   jacobian_.setZero(n_, n_ + inputs_);
-  factor_.compute(Eigen::MatrixXd::Identity(n_, n_));  // of its final size
+  factor_ = Eigen::LLT<Eigen::MatrixXd>(n_);
 }
 
 void PlaceSmoother::reset() noexcept {

@@ -45,7 +45,7 @@ RheProblem make_process_problem(std::shared_ptr<const ProcessModel> model, RhePr
 
 InformationOf::InformationOf(Eigen::Index n)
     : sigmas_(Eigen::VectorXd::Zero(n)), scaled_(Eigen::MatrixXd::Zero(n, n)), inverse_(scaled_) {
-  factor_.compute(Eigen::MatrixXd::Identity(n, n));  // of its final size
+  factor_ = Eigen::LLT<Eigen::MatrixXd>(n);
 }
 
 void InformationOf::find(const Eigen::MatrixXd& covariance, Eigen::MatrixXd& information) noexcept {

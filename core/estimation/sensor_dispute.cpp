@@ -2,8 +2,7 @@
 #include <cmath>
 #include <numbers>
 
-#include <Eigen/LU>
-
+#include "innovation.hpp"
 #include "sensor_watch_parts.hpp"
 
 // Who is wrong, where a sensor and the estimate disagree.
@@ -132,7 +131,7 @@ double SensorWatch::likelihood(WalkingFilter& filter, bool with_rejected) noexce
   double sum = 0.0;
   for (std::size_t s = 0; s < sensors_.size(); ++s)
     if ((with_rejected || !(findings_[s] & reason::rejected)) && filter.innovation(sensors_[s], raw_.data(), scratch_))
-      sum -= 0.5 * (scratch_.nis + std::log(scratch_.covariance.determinant()));
+      sum -= 0.5 * (scratch_.nis + log_determinant(scratch_.covariance));
   return sum;
 }
 

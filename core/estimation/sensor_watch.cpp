@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "innovation.hpp"
 #include "rhec/core/base/error.hpp"
 #include "sensor_watch_parts.hpp"
 
@@ -81,7 +82,7 @@ SensorWatch::SensorWatch(std::shared_ptr<const Model> model, const Setup& setup)
   memory_->before_mean = Eigen::VectorXd::Zero(n);
   memory_->before_covariance = Eigen::MatrixXd::Zero(n, n);
   memory_->away = Eigen::VectorXd::Zero(n);
-  memory_->factor.compute(Eigen::MatrixXd::Identity(n, n));  // of its final size
+  memory_->factor = Eigen::LLT<Eigen::MatrixXd>(n);
   for (Memory::Entry& entry : memory_->entries) {
     entry.mean = memory_->before_mean;
     entry.covariance = memory_->before_covariance;
@@ -311,10 +312,10 @@ bool SensorWatch::is_still_off(const Record& record, const Innovation& innovatio
   const Innovation::OfSensor<1>& value = innovation.value;
   if (record.error.size() != value.size()) return false;
   const Innovation::OfSensor<1> rest = value - record.error;
-  const double of_error = rest.dot(innovation.covariance.llt().solve(rest));
+  const double of_error = squared_size(rest, innovation.covariance);
   if (of_error > innovation.nis + much_nearer) return false;
   return of_error < innovation.nis ||
-         value.dot(record.covariance.llt().solve(value)) > close_limits_[static_cast<std::size_t>(value.size())];
+         squared_size(value, record.covariance) > close_limits_[static_cast<std::size_t>(value.size())];
 }
 
 bool SensorWatch::is_searching() const noexcept { return memory_->search && memory_->search->is_active(); }

@@ -4,8 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include <Eigen/Cholesky>
-
+#include "innovation.hpp"
 #include "rhec/core/base/angle.hpp"
 
 namespace rhec {
@@ -104,10 +103,7 @@ bool WalkingFilter::innovation(const Sensor& sensor, const double* outputs, Inno
       result.covariance(a, b) = sum;
     }
   }
-  const Eigen::LLT<Innovation::OfSensor<Eigen::Dynamic>> root(result.covariance);
-  Innovation::OfSensor<1> scaled = result.value;
-  root.matrixL().solveInPlace(scaled);
-  result.nis = scaled.squaredNorm();
+  result.nis = squared_size(result.value, result.covariance);
   return true;
 }
 

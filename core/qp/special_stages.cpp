@@ -2,8 +2,7 @@
 // those whose reduced Hessian is not positive definite.
 #include <algorithm>
 #include <cmath>
-
-#include <Eigen/Eigenvalues>
+#include <limits>
 
 #include "rhec/core/kernels/riccati_kernels.hpp"
 #include "rhec/core/qp/riccati.hpp"
@@ -161,6 +160,52 @@ void reflect_two(double* matrix) noexcept {
   c = left + share * c;
 }
 
+/// Turns the vectors x and y of n numbers, `step` apart, by an angle of this sine and cosine.
+void turn(double sine, double cosine, int n, int step, double* x, double* y) noexcept {
+  for (int k = 0; k < n * step; k += step) {
+    const double before = x[k];
+    x[k] = cosine * before - sine * y[k];
+    y[k] = sine * before + cosine * y[k];
+  }
+}
+
+/// The same for n rows, column after column. Eigenvalues and eigenvectors are those of Jacobi's method (Golub and Van
+/// Loan, Matrix Computations, section 8.5): pairs of rows and columns are turned until nothing is left beside the
+/// diagonal. For the few inputs of a vehicle it is as quick as others, and it needs no memory but this.
+void reflect(double* matrix, int n) noexcept {
+  constexpr int most_sweeps = 30;  // convergence is quadratic: six or so are enough
+  double vectors[small::longest * small::longest];
+  std::fill_n(vectors, n * n, 0.0);
+  for (int j = 0; j < n; ++j) vectors[j * n + j] = 1.0;
+  double size = 0.0;
+  for (int k = 0; k < n * n; ++k) size = std::max(size, std::abs(matrix[k]));
+  bool is_diagonal = false;
+  for (int sweep = 0; sweep < most_sweeps && !is_diagonal; ++sweep) {
+    is_diagonal = true;
+    for (int p = 0; p < n; ++p) {
+      for (int q = p + 1; q < n; ++q) {
+        const double beside = matrix[q * n + p];
+        if (std::abs(beside) <= std::numeric_limits<double>::epsilon() * size) continue;
+        is_diagonal = false;
+        const double slope = 0.5 * (matrix[q * n + q] - matrix[p * n + p]) / beside;
+        const double tangent = std::copysign(1.0 / (std::abs(slope) + std::hypot(1.0, slope)), slope);
+        const double cosine = 1.0 / std::hypot(1.0, tangent), sine = tangent * cosine;
+        turn(sine, cosine, n, 1, matrix + p * n, matrix + q * n);
+        turn(sine, cosine, n, n, matrix + p, matrix + q);
+        turn(sine, cosine, n, 1, vectors + p * n, vectors + q * n);
+      }
+    }
+  }
+  double values[small::longest], top = least_curvature;
+  for (int j = 0; j < n; ++j) top = std::max(top, values[j] = std::abs(matrix[j * (n + 1)]));
+  std::fill_n(matrix, n * n, 0.0);
+  for (int j = 0; j < n; ++j) {
+    const double *const vector = vectors + j * n, value = std::max(values[j], least_ratio * top);
+    for (int c = 0; c < n; ++c)
+      for (int r = 0; r < n; ++r) matrix[c * n + r] += value * vector[r] * vector[c];
+  }
+}
+
 }  // namespace
 
 /// Cholesky factor of a reduced Hessian, which is convexified first if necessary.
@@ -168,31 +213,23 @@ void Riccati::factor_reduced(double* reduced, int n, double tolerance, double* f
   for (int j = 0; j < n; ++j) std::copy_n(reduced + j * width_, n, factor + j * width_);
   if (small::factor(factor, width_, n, tolerance)) return;
   convexified_ = true;
-  using Small = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, max_width, max_width>;
-  Small matrix(n, n);
+  double matrix[max_width * max_width];
   bool finite = true;
   for (int c = 0; c < n; ++c) {
     for (int r = 0; r < n; ++r) {
-      matrix(r, c) = 0.5 * (reduced[c * width_ + r] + reduced[r * width_ + c]);
-      finite = finite && std::isfinite(matrix(r, c));
+      const double entry = matrix[c * n + r] = 0.5 * (reduced[c * width_ + r] + reduced[r * width_ + c]);
+      finite = finite && std::isfinite(entry);
     }
   }
   if (!finite) {  // no sensible result is possible: the caller will find that the step is not finite
     for (int j = 0; j < n; ++j) factor[j * width_ + j] = std::nan("");
     return;
   }
-  if (n == 2) {
-    reflect_two(matrix.data());
-  } else {
-    const Eigen::SelfAdjointEigenSolver<Small> eigen(matrix);
-    Small values = Small::Zero(n, n);
-    const double top = std::max(eigen.eigenvalues().cwiseAbs().maxCoeff(), least_curvature);
-    for (int j = 0; j < n; ++j) values(j, j) = std::max(std::abs(eigen.eigenvalues()[j]), least_ratio * top);
-    Small half(n, n);
-    half.noalias() = eigen.eigenvectors().lazyProduct(values);
-    matrix.noalias() = half.lazyProduct(eigen.eigenvectors().transpose());
-  }
-  for (int c = 0; c < n; ++c) std::copy_n(matrix.data() + c * n, n, factor + c * width_);
+  if (n == 2)
+    reflect_two(matrix);
+  else
+    reflect(matrix, n);
+  for (int c = 0; c < n; ++c) std::copy_n(matrix + c * n, n, factor + c * width_);
   small::factor(factor, width_, n, 0.0);
 }
 

@@ -17,6 +17,11 @@ namespace {
 constexpr double least_sigma = 1e-9;        // of noise, in scales, so that one measurement does not dominate all others
 constexpr double largest_null_part = 1e-6;  // of a unit vector, in the undetermined subspace
 
+/// R of a QR decomposition, on and above the diagonal.
+Eigen::MatrixXd triangle_of(const Eigen::MatrixXd& matrix) {
+  return Eigen::HouseholderQR<Eigen::MatrixXd>(matrix).matrixQR();
+}
+
 }  // namespace
 
 void Drives::add_parameters(const Drive& drive, int interval, int first, Eigen::Ref<Matrix> by_unknowns) const {
@@ -155,11 +160,11 @@ DriveInformation Drives::information(const Drive& drive, bool with_errors) const
     return found;
   }
   Matrix root = Matrix::Zero(unknowns, unknowns);
-  const Matrix factor = Eigen::HouseholderQR<Matrix>(stacked).matrixQR();
+  const Matrix factor = triangle_of(stacked);
   const Eigen::Index height = std::min<Eigen::Index>(unknowns, factor.rows() - steps);
   root.topRows(height) = factor.block(steps, steps, height, unknowns).template triangularView<Eigen::Upper>();
 
-  const Eigen::JacobiSVD<Matrix> svd(root, Eigen::ComputeFullV);
+  const Eigen::JacobiSVD<Matrix, Eigen::NoQRPreconditioner> svd(root, Eigen::ComputeFullV);
   const Vector& values = svd.singularValues();
   // Squares of sensitivities that are finite need not be.
   if (!root.allFinite() || !values.allFinite() || !svd.matrixV().allFinite()) {
@@ -195,7 +200,9 @@ double Drives::condition_of_jacobians(const Drive& drive) const {
                                           : about_.parameters[(c - nx_ - nu_) % np_];
       jacobian.col(c) *= v.scale;
     }
-    const Vector values = Eigen::JacobiSVD<Matrix>(jacobian).singularValues();
+    // Singular values of the transpose, which has no fewer rows than columns, are those of its triangle.
+    const Matrix triangle = triangle_of(jacobian.transpose()).topRows(nx_).triangularView<Eigen::Upper>();
+    const Vector values = Eigen::JacobiSVD<Matrix, Eigen::NoQRPreconditioner>(triangle).singularValues();
     largest = std::max(largest, values[0] / values[values.size() - 1]);
   }
   return largest;

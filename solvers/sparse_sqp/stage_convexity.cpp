@@ -94,7 +94,9 @@ class Recursion {
   bool factor(const Eigen::MatrixXd& pivot, const Eigen::VectorXd& sizes) {
     const double least = std::max(rounding * rounding * sizes.maxCoeff(), std::numeric_limits<double>::min());
     const Eigen::VectorXd zero = (rounding * sizes).cwiseMax(least);
-    factor_.compute(pivot + Eigen::MatrixXd(zero.asDiagonal()));
+    Eigen::MatrixXd raised = pivot;
+    raised.diagonal() += zero;
+    factor_.compute(raised);
     return factor_.info() == Eigen::Success;
   }
 

@@ -23,7 +23,8 @@ bool stage_covariances(const StageQp& qp, std::span<double> blocks) {
     next.noalias() += A.transpose() * PA;
     if (qp.controls(i) > 0) {
       const Eigen::MatrixXd B = B_of(qp, i);
-      factor.compute(R_of(qp, i) + B.transpose() * P * B);
+      const Eigen::MatrixXd reduced = R_of(qp, i) + B.transpose() * P * B;
+      factor.compute(reduced);
       if (factor.info() != Eigen::Success) return false;
       const Eigen::MatrixXd W = factor.matrixL().solve(S_of(qp, i) + B.transpose() * PA);
       spread[i] = factor.matrixL().solve(B.transpose()).transpose();

@@ -1,0 +1,15 @@
+#pragma once
+
+#include "rhec/core/estimation/health.hpp"
+
+// Of innovations and their covariances S, of one sensor each.
+namespace rhec {
+
+/// nu' S^-1 nu.
+double squared_size(const Innovation::OfSensor<1>& value,
+                    const Innovation::OfSensor<Eigen::Dynamic>& covariance) noexcept;
+
+/// log det S; not a number if S is not positive definite.
+double log_determinant(const Innovation::OfSensor<Eigen::Dynamic>& covariance) noexcept;
+
+}  // namespace rhec
