@@ -9,6 +9,9 @@
 #include <Eigen/LU>
 #include <Eigen/QR>
 
+// What is named below is inside Eigen 3.4; with another version each source has its own.
+#if EIGEN_VERSION_AT_LEAST(3, 4, 0) && !EIGEN_VERSION_AT_LEAST(3, 4, 50)
+
 #ifndef RHEC_COMPILED_ONCE  // compiled_once.cpp defines it as nothing
 #define RHEC_COMPILED_ONCE extern
 #endif
@@ -102,3 +105,5 @@ RHEC_COMPILED_ONCE template void PartialPivLU<MatrixXd>::compute();
 RHEC_COMPILED_ONCE template void ColPivHouseholderQR<MatrixXd>::computeInPlace();
 
 }  // namespace Eigen
+
+#endif
