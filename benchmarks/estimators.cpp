@@ -87,6 +87,9 @@ class Forwarding final : public EstimationMethod {
     waiting_.push_back(std::move(sample));
     for (Beside& other : others_) {
       other.estimator->push_input(time_, interval.inputs);
+      for (int k = 0; k < interval.between; ++k)
+        other.estimator->push_measurement(time_ + interval.times[k],
+                                          interval.outputs + static_cast<std::ptrdiff_t>(k) * model().output_count());
       other.estimator->push_measurement(now, waiting_.back().others.data());
       if (std::ssize(waiting_) > trouble_.late)
         other.estimator->push_measurement(waiting_.front().time, waiting_.front().fixes.data());
@@ -157,21 +160,29 @@ struct Errors {
   explicit Errors(const ModelDescription& description)
       : about(description),
         parameters(description.parameters.size(), 0.0),
-        inside(description.parameters.size() + description.states.size(), 0.0) {}
+        inside(description.parameters.size(), 0.0) {}
   void add(const sim::Sample& truth, const Eigen::VectorXd& state, const Eigen::VectorXd& p,
            const Eigen::MatrixXd& covariance) {
     ++count;
-    Eigen::VectorXd error(state.size() + p.size());
-    error << state - truth.true_state, p - truth.true_parameters;
-    for (std::size_t j = 0; j < about.states.size(); ++j)
-      if (about.states[j].is_angle) error[j] = angle_difference(state[j], truth.true_state[j]);
+    // Of an estimated state [x; b; k; m] nobody knows the m, the values of outputs of motion.
+    const Eigen::Index nx = truth.true_state.size(), skipped = state.size() - nx;
+    Eigen::VectorXd error(nx + p.size());
+    error << state.head(nx) - truth.true_state, p - truth.true_parameters;
+    const auto at = [&](Eigen::Index j) { return j < nx ? j : j + skipped; };
+    const Eigen::MatrixXd known = Eigen::MatrixXd::NullaryExpr(
+        error.size(), error.size(), [&](Eigen::Index r, Eigen::Index c) { return covariance(at(r), at(c)); });
+    for (Eigen::Index j = 0; j < nx; ++j)
+      if (about.states[static_cast<std::size_t>(j)].is_angle)
+        error[j] = angle_difference(state[j], truth.true_state[j]);
     const Roles& roles = about.roles;
     if (roles.position_x >= 0) position += std::hypot(error[roles.position_x], error[roles.position_y]);
     if (roles.heading >= 0) heading += std::abs(error[roles.heading]);
-    for (std::size_t j = 0; j < parameters.size(); ++j) parameters[j] += std::abs(error[state.size() + j]);
-    nees += error.dot(covariance.ldlt().solve(error));
-    for (Eigen::Index j = 0; j < error.size(); ++j)
-      inside[j] += std::abs(error[j]) <= 2.0 * std::sqrt(covariance(j, j));
+    for (std::size_t j = 0; j < parameters.size(); ++j) {
+      const auto k = nx + static_cast<Eigen::Index>(j);
+      parameters[j] += std::abs(error[k]);
+      inside[j] += std::abs(error[k]) <= 2.0 * std::sqrt(known(k, k));
+    }
+    nees += error.dot(known.ldlt().solve(error));
   }
   std::string json() const {
     const auto mean = [&](double sum) { return sum / count; };
@@ -179,7 +190,7 @@ struct Errors {
                                    count, mean(position), mean(heading), mean(nees));
     for (std::size_t j = 0; j < parameters.size(); ++j)
       text += fmt::format(", \"{0}\": {1:.6g}, \"{0}_inside\": {2:.6g}", about.parameters[j].name, mean(parameters[j]),
-                          mean(inside[about.states.size() + j]));
+                          mean(inside[j]));
     return text;
   }
 

@@ -7,6 +7,8 @@
 #include <numeric>
 #include <utility>
 
+#include <Eigen/Cholesky>
+
 #include <fmt/format.h>
 
 #include "rhec/core/base/error.hpp"
@@ -71,6 +73,20 @@ struct Filling {
   }
 };
 
+/// See `Process::off_course`. The value halfway has the variance Q - Q F' (F Q F' + Q)^-1 F Q given the states
+/// at both ends, with F and Q of half the way: of a walk that is a Brownian bridge, with its s (1 - s) everywhere.
+double variance_off_course(const Prior& prior, double duration, double distance) noexcept {
+  if (prior.course() != Course::ramp) return 0.0;
+  using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, Prior::max_states, Prior::max_states>;
+  const double way = prior.along() == Along::time ? duration : distance;
+  const int n = prior.state_count();
+  Matrix F(n, n), Q(n, n);
+  prior.advance(0.5 * way, F.data(), Q.data());
+  const Matrix image = F * Q, end = image * F.transpose() + Q, gain = end.ldlt().solve(image);
+  const double halfway = Q(0, 0) - image.col(0).dot(gain.col(0));
+  return std::isfinite(halfway) ? 4.0 * std::max(halfway, 0.0) : 0.0;
+}
+
 }  // namespace
 
 int PriorBank::first_state(int parameter) const noexcept { return processes_[parameter].first; }
@@ -114,6 +130,7 @@ PriorBank::PriorBank(std::shared_ptr<const Model> model, Setup setup)
     process.Q.assign(size * lanes_, 0.0);
     process.ramp.assign(lanes_, 0.0);
     process.offset.assign(setup_.map ? lanes_ : 0, 0.0);
+    process.off_course.assign(looks_ahead() ? lanes_ : 0, 0.0);
     for (int m = 0; m < members_; ++m) process.ramp[m] = setup_.members[m][j]->course() == Course::ramp ? 1.0 : 0.0;
     n_ += process.count;
     processes_.push_back(std::move(process));
@@ -146,9 +163,15 @@ PriorBank::PriorBank(std::shared_ptr<const Model> model, Setup setup)
                     {setup_.output_variances, setup_.input_variances, lower, upper, setup_.motion_outputs, single},
                     setup_.substeps,
                     setup_.most_between},
+        .excitation = {model_, setup_.motion_outputs, setup_.substeps,
+                       ReadingSummary(setup_.motion_outputs, ny_, setup_.most_between, setup_.substeps).most()},
         .curved_outputs = curved_outputs(*model_, setup_.motion_outputs)});
     ahead_->output_curvature = Curvature(static_cast<int>(ahead_->curved_outputs.size()), nx_, ny_);
     ahead_->ramp_variances.assign(np_, 0.0);
+    ahead_->part.assign(ny_, 0.0);
+    ahead_->shares.assign(static_cast<std::size_t>(ahead_->mixture.summary().most()), 0.0);
+    ahead_->surprises.assign(ny_ * M, 0.0);
+    learnt_.resize(learnt_.size() + ahead_->excitation.history_size(), 0.0);
     ahead_->no_input.assign(nu_, 0.0);
     const auto a = static_cast<std::size_t>(wide_count());
     for (auto* v : {&ahead_->next_point, &ahead_->trial_mean}) v->assign(a * M, 0.0);
@@ -335,8 +358,14 @@ double PriorBank::take_outputs(const Frame& frame, const double* y, const double
   const int taken = view_outputs(frame.gradient, entries, y);
   if (taken == 0) return 0.0;
   if (!setup_.robust.empty()) weigh_outputs(frame, y, taken, robust_weights);
+  if (ahead_ && members_ > 1)
+    ahead_->bound_surprises(view, *views_, y, setup_.motion_outputs, output_variances_.data());
   bank_kernels().update(view, views_->outputs.data(), taken, setup_.gate, squares_.data(),
                         innovation_variances_.data());
+  if (!frame.tells_laws) {
+    if (setup_.adapts_noise) adapt_noise(frame, y);
+    return 0.0;
+  }
   double best = -std::numeric_limits<double>::infinity();
   for (int m = 0; m < members_; ++m) {
     // One logarithm for several outputs; the product of many would leave the range of a double.
@@ -351,13 +380,15 @@ double PriorBank::take_outputs(const Frame& frame, const double* y, const double
     log_likelihoods_[m] += squares_[m];
     if (squares_[m] > best) best = squares_[m];
   }
-  double sum = 0.0;
+  double sum = 0.0, evidence = 0.0;
   for (int m = 0; m < members_; ++m) {
-    const double likelihood = std::exp(squares_[m] - best);
-    weights_[m] *= std::isfinite(likelihood) ? likelihood : 0.0;
+    const double likelihood = std::exp(squares_[m] - best), finite = std::isfinite(likelihood) ? likelihood : 0.0;
+    evidence += weights_[m] * finite;
+    // A sensor of motion shows a wrong law so finely that innovations are not independent: see docs/method.md.
+    weights_[m] *= ahead_ ? std::sqrt(finite) : finite;
     sum += weights_[m];
   }
-  const double log_likelihood = best + std::log(sum);
+  const double log_likelihood = best + std::log(ahead_ ? evidence : sum);
   for (int m = 0; m < members_; ++m)
     weights_[m] = sum > 0.0 ? std::max(weights_[m] / sum, least_weight) : 1.0 / members_;
   sum = std::accumulate(weights_.begin(), weights_.begin() + members_, 0.0);
@@ -399,8 +430,10 @@ void PriorBank::advance_processes(double duration) noexcept {
       const Filling filling{prior, process.place, process.filler, process.count};
       filling.transition(own_.data(), filled_.data());
       filling.covariance(own_covariance_.data(), filled_covariance_.data());
+      const double off_course = ahead_ && members_ > 1 ? variance_off_course(prior, duration, distance_) : 0.0;
       for (int m = 0; m < lanes_; ++m) {
         if (process.kind_of[std::min(m, members_ - 1)] != static_cast<int>(kind)) continue;
+        if (ahead_) process.off_course[m] = off_course;
         for (int e = 0; e < process.count * process.count; ++e) {
           process.F[e * lanes_ + m] = filled_[e];
           process.Q[e * lanes_ + m] = filled_covariance_[e];

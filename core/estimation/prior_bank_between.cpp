@@ -1,6 +1,7 @@
 // How a PriorBank uses measurements between two nodes, and where it linearises an interval with outputs of motion.
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <utility>
 
@@ -11,6 +12,13 @@
 #include "rhec/core/kernels/kernel_sets.hpp"
 
 namespace rhec {
+namespace {
+
+/// Steps of the parameters to where an interval is linearised, with states and inputs held: one finds them, up to what
+/// they change of each other's gradients.
+constexpr int most_steps_of_slip = 2;
+
+}  // namespace
 
 /// Within an interval, what is unknown are the state at its start, the input's noise and that of the processes: a
 /// measurement at a later time tells of all of them. The vector [x; z; u; q] takes such measurements in one after the
@@ -23,6 +31,7 @@ void PriorBank::predict(const MeasuredInterval& measured, const double* end_outp
   RHEC_ASSERT(!wide_mean_.empty(), "a bank that was set up for measurements between nodes");
   begin_step(measured.inputs, measured.duration);
   widen();
+  if (ahead_) ahead_->end_outputs = end_outputs;
   const MeasuredInterval interval = has_motion ? look_ahead(measured, end_outputs) : measured;
   for (int k = 0; k < interval.between; ++k) take_between(interval, k, has_motion);
   if (has_motion) {
@@ -71,10 +80,27 @@ MeasuredInterval PriorBank::look_ahead(const MeasuredInterval& measured, const d
       at(n_ + nu_ + process.first - nx_) = found[nx_ + j] + found[nx_ + np_ + nu_ + j] - end;
     }
   }
+  // Where that tells little of slip, states and inputs stand where it tells what may be believed; parameters follow.
+  const bool is_held =
+      members_ > 1 && ahead_->excitation.find(interval, ahead_->mixture.summary().weights(), end_outputs,
+                                              {ahead_->mixture.mean, ahead_->mixture.covariance, input_.data(),
+                                               variances_.data(), learnt_.data()},
+                                              learnt_.data() + 2 * static_cast<std::ptrdiff_t>(ny_));
+  const auto hold = [&] {
+    const Eigen::VectorXd& target = ahead_->excitation.target();
+    for (int r = 0; r < nx_; ++r) std::fill_n(point_.begin() + r * M, M, target[r]);
+    for (int j = 0; j < nu_; ++j) std::fill_n(point_.begin() + (n_ + j) * M, M, target[nx_ + j]);
+  };
+  if (is_held) {
+    point_ = wide_mean_;
+    hold();
+  }
+  const int most_steps = is_held ? most_steps_of_slip : most_look_ahead_steps;
   for (int step = 0;; ++step) {
     linearise_about_point(interval, end_outputs);
-    if (step == most_look_ahead_steps || !move_point(interval, end_outputs)) return interval;
+    if (step == most_steps || !move_point(interval, end_outputs)) return interval;
     std::swap(point_, ahead_->next_point);
+    if (is_held) hold();
   }
 }
 
@@ -212,6 +238,7 @@ void PriorBank::linearise_about_point(const MeasuredInterval& interval, const do
   for (int k = 0; k < interval.between; ++k) {
     const double seconds = interval.times[k], first = interval.times[0],
                  from_first = (seconds - first) / (interval.duration - first);
+    ahead_->shares[static_cast<std::size_t>(k)] = seconds / interval.duration;
     integrate_members(point_.data(), true, seconds, seconds / interval.duration);
     add_curvature(from_first);
     linearise_outputs(k, interval.outputs + static_cast<std::ptrdiff_t>(k) * ny_, seconds / interval.duration,
@@ -278,15 +305,58 @@ const double* PriorBank::reading_weights(int which) const noexcept {
   return ahead_->mixture.summary().weights() + static_cast<std::ptrdiff_t>(which) * ny_;
 }
 
-/// Noise variances of the outputs of measurement number `which`.
+/// Noise variances of the outputs of measurement number `which`, linearised before. How far slip is from its ramp
+/// within the interval is common to readings that are close; as noise of each of them it would count for too little:
+/// the mean of a Brownian bridge has the variance Q / 12, that of four values the quarter of Q / 6. So it counts twice.
 void PriorBank::weigh_readings(int which) noexcept {
   const double* const weights = reading_weights(which);
   for (std::ptrdiff_t j = 0; j < ny_; ++j)
     std::fill_n(output_variances_.data() + j * lanes_, lanes_, learnt_[j] / weights[j]);
+  if (members_ == 1) return;
+  const std::ptrdiff_t M = lanes_;
+  const double share = ahead_->shares[static_cast<std::size_t>(which)];
+  for (const std::ptrdiff_t j : setup_.motion_outputs) {
+    const double* const gradient =
+        wide_gradient_.data() + (static_cast<std::ptrdiff_t>(which) * ny_ + j) * wide_count() * M;
+    for (const Process& process : processes_) {
+      const double* const by_noise = gradient + (n_ + nu_ + process.first - nx_) * M;
+      for (std::ptrdiff_t m = 0; m < M; ++m) {
+        const double by_slip = by_noise[m] / share;
+        output_variances_[j * M + m] += 2.0 * share * (1.0 - share) * process.off_course[m] * by_slip * by_slip;
+      }
+    }
+  }
+}
+
+/// No law of slip knows an edge of the ground within an interval: beside a gyro it is an innovation of tens of standard
+/// deviations, and linearised it would be laid on whatever is uncertain, heading and inputs too. So an innovation
+/// counts as no more than three, with noise as large as that takes.
+void PriorBank::LookAhead::bound_surprises(const BankView& view, const Views& views, const double* y,
+                                           const std::vector<int>& motion_outputs, double* variances) noexcept {
+  constexpr double most = 9.0;
+  const std::ptrdiff_t M = view.members;
+  bank_kernels().surprise(view, views.outputs.data(), views.taken, surprises.data());
+  std::ptrdiff_t place = 0;
+  for (std::ptrdiff_t j = 0; j < std::ssize(part); ++j) {
+    if (std::isnan(y[j])) continue;
+    const BankOutput& output = views.outputs[static_cast<std::size_t>(place)];
+    const double* const square = surprises.data() + place * M;
+    ++place;
+    if (!std::ranges::binary_search(motion_outputs, static_cast<int>(j))) continue;
+    for (std::ptrdiff_t m = 0; m < M; ++m) {
+      if (!(square[m] > most)) continue;
+      double innovation = output.measured - output.predicted[m];
+      if (output.period > 0.0) innovation = std::remainder(innovation, output.period);
+      variances[j * M + m] += innovation * innovation * (1.0 / most - 1.0 / square[m]);
+    }
+  }
 }
 
 /// Takes in the measurements at a time within the interval, linearised about the mean as it is by then or, as they have
 /// been already, about `point_`.
+///
+/// Readings of an output of motion within one interval lie on a few metres of ground, where every field is smooth, and
+/// tell of that together: of a law they say the same again and again. So the last of them weighs the members.
 void PriorBank::take_between(const MeasuredInterval& interval, int which, bool about_point) noexcept {
   const std::ptrdiff_t a = wide_count(), M = lanes_;
   const double* const y = interval.outputs + static_cast<std::ptrdiff_t>(which) * ny_;
@@ -295,20 +365,36 @@ void PriorBank::take_between(const MeasuredInterval& interval, int which, bool a
     integrate_members(wide_mean_.data(), true, seconds, share);
     linearise_outputs(which, y, share, 1.0);
   }
-  if (about_point) {
-    expect_outputs(which, y, wide_mean_.data());
-    weigh_readings(which);
+  const auto take = [&](const double* taken, bool tells_laws) {
+    if (about_point) {
+      expect_outputs(which, taken, wide_mean_.data());
+      weigh_readings(which);
+    }
+    if (setup_.adapts_noise) wide_before_ = wide_mean_;
+    between_log_likelihood_ +=
+        take_outputs({.view = {lanes_, static_cast<int>(a), static_cast<int>(a), wide_mean_.data(),
+                               wide_covariance_.data(), wide_work_.data()},
+                      .gradient = wide_gradient_.data() + static_cast<std::ptrdiff_t>(which) * ny_ * a * M,
+                      .before = wide_before_.data(),
+                      .before_entry = lanes_,
+                      .before_lane = 1,
+                      .weights = about_point ? reading_weights(which) : nullptr,
+                      .tells_laws = tells_laws},
+                     taken, nullptr);
+  };
+  if (!about_point || members_ == 1) return take(y, true);
+  const auto is_repeated = [&](int j) {
+    return is_of_motion(j) && LookAhead::is_measured_later(interval, which, ny_, j, ahead_->end_outputs);
+  };
+  for (const bool repeated : {false, true}) {
+    bool any = false;
+    for (int j = 0; j < ny_; ++j) {
+      const bool chosen = !std::isnan(y[j]) && is_repeated(j) == repeated;
+      ahead_->part[j] = chosen ? y[j] : std::numeric_limits<double>::quiet_NaN();
+      any = any || chosen;
+    }
+    if (any) take(ahead_->part.data(), !repeated);
   }
-  if (setup_.adapts_noise) wide_before_ = wide_mean_;
-  between_log_likelihood_ +=
-      take_outputs({.view = {lanes_, static_cast<int>(a), static_cast<int>(a), wide_mean_.data(),
-                             wide_covariance_.data(), wide_work_.data()},
-                    .gradient = wide_gradient_.data() + static_cast<std::ptrdiff_t>(which) * ny_ * a * M,
-                    .before = wide_before_.data(),
-                    .before_entry = lanes_,
-                    .before_lane = 1,
-                    .weights = about_point ? reading_weights(which) : nullptr},
-                   y, nullptr);
 }
 
 /// Of an interval without measurements between its nodes, linearised about `point_`: as `take_step` from the mean.

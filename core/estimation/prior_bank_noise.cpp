@@ -17,7 +17,8 @@ constexpr double unknown_noise = 4.0, known_noise = 0.25;
 
 /// To what is stated.
 void PriorBank::reset_noise() noexcept {
-  std::fill(learnt_.begin(), learnt_.end(), unknown_noise);
+  std::fill(learnt_.begin(), learnt_.end(), 0.0);
+  std::fill_n(learnt_.begin() + ny_, ny_, unknown_noise);
   std::copy(setup_.output_variances.begin(), setup_.output_variances.end(), learnt_.begin());
   spread_variances();
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <numbers>
 #include <vector>
@@ -10,6 +11,8 @@
 #include "rhec/core/estimation/kalman_filter.hpp"
 #include "rhec/core/estimation/prior_bank.hpp"
 #include "rhec/core/kernels/bank_kernels.hpp"
+
+#include "excitation.hpp"
 
 namespace rhec {
 
@@ -22,16 +25,34 @@ struct PriorBank::Process {
   std::vector<const Prior*> kinds;  ///< the different priors of this parameter
   std::vector<int> kind_of;         ///< per member
   AlignedDoubles F, Q, ramp;        ///< lanes
-  AlignedDoubles offset;            ///< lanes; of the value, where a map is followed
+  /// Lanes; beside outputs of motion: of how far a ramp is from the parameter at the share s of the interval, the
+  /// variance over s (1 - s). 0 where the parameter is held.
+  AlignedDoubles off_course;
+  AlignedDoubles offset;  ///< lanes; of the value, where a map is followed
 };
 
 /// What outputs of motion ask for: a filter on the mixture's [x; p], and the way to where an interval is linearised.
 struct PriorBank::LookAhead {
   KalmanFilter mixture;
-  std::vector<int> curved_outputs;                                                     ///< of motion
-  Curvature output_curvature = {};                                                     ///< of these, by the state
+  Excitation excitation;            ///< of slip: what it keeps stands behind the noise in `learnt_`
+  std::vector<int> curved_outputs;  ///< of motion
+  Curvature output_curvature = {};  ///< of these, by the state
   AlignedDoubles next_point = {}, moved = {}, trial_mean = {}, trial_covariance = {};  ///< of the wide vector
   std::vector<double> ramp_variances = {}, no_input = {};
+  std::vector<double> shares = {};      ///< of the interval, at its measurements
+  std::vector<double> part = {};        ///< n_y: some of the outputs of a time
+  AlignedDoubles surprises = {};        ///< n_y, lanes
+  const double* end_outputs = nullptr;  ///< of the interval
+  /// Raises the variances of outputs of motion (n_y, lanes) whose innovations are far larger than expected.
+  void bound_surprises(const BankView& view, const Views& views, const double* y,
+                       const std::vector<int>& motion_outputs, double* variances) noexcept;
+  /// Whether an output is measured again on the interval after measurement number `which`, or at its end.
+  static bool is_measured_later(const MeasuredInterval& interval, int which, std::ptrdiff_t output_count, int output,
+                                const double* end_outputs) noexcept {
+    for (int k = which + 1; k < interval.between; ++k)
+      if (!std::isnan(interval.outputs[k * output_count + output])) return true;
+    return end_outputs && !std::isnan(end_outputs[output]);
+  }
 };
 
 /// What the kernels are given.
@@ -54,6 +75,7 @@ struct PriorBank::Frame {
   std::ptrdiff_t before_entry, before_lane;
   bool is_between = true;           ///< the outputs are of a time between two nodes
   const double* weights = nullptr;  ///< n_y: how many measurements each stands for; null: one
+  bool tells_laws = true;           ///< whether the outputs weigh the members
 };
 
 }  // namespace rhec

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <random>
 #include <vector>
 
 #include "rhec/core/base/error.hpp"
@@ -423,6 +424,108 @@ TEST(PriorBank, IsTheKalmanFilterWithOutputsOfMotion) {
       ASSERT_LT(largest(covariance - filter.covariance), 1e-9 * (1.0 + largest(covariance))) << k;
     }
   }
+}
+
+/// Two laws of a turntable's traction, and a gyro beside an angle that is hardly measured.
+PriorBank::Setup of_two_laws(const TurntableNoise& noise, const char* calm, const char* quick) {
+  PriorBank::Setup setup;
+  setup.members = {{prior("walk", calm)}, {prior("walk", quick)}};
+  setup.output_variances = {noise.angle * noise.angle, noise.gyro * noise.gyro};
+  setup.input_variances = {noise.omega * noise.omega};
+  setup.most_between = 20;
+  setup.motion_outputs = {1};
+  return setup;
+}
+
+/// While nothing turns, a gyro tells nothing of traction, at whatever rate: neither does the mean move, nor is it known
+/// better.
+TEST(PriorBank, DoesNotLearnTractionFromATurntableThatRests) {
+  const TurntableNoise noise{.angle = 0.1, .gyro = 0.005, .omega = 0.02};
+  for (const int readings : {0, 19}) {
+    const auto model = turntable();
+    PriorBank bank(model, of_two_laws(noise, "{sigma: 0.001, along: time, course: ramp, mean: 0.75, mean_sigma: 0.3}",
+                                      "{sigma: 0.002, along: time, course: ramp, mean: 0.75, mean_sigma: 0.3}"));
+    std::mt19937 random(11);
+    std::normal_distribution<double> normal;
+    int inside = 0, count = 0;
+    double shift = 0.0, least = 1.0;
+    for (int run = 0; run < 20; ++run) {
+      bank.reset(Eigen::VectorXd::Zero(model->state_count()),
+                 Eigen::MatrixXd::Identity(model->state_count(), model->state_count()) * 1e-4);
+      Eigen::VectorXd mean;
+      Eigen::MatrixXd covariance;
+      for (int k = 0; k < 200; ++k) {
+        const double omega = noise.omega * normal(random), nan = std::numeric_limits<double>::quiet_NaN();
+        std::vector<double> times, between;
+        for (int i = 1; i <= readings; ++i) {
+          times.push_back(0.2 * i / (readings + 1));
+          between.insert(between.end(), {nan, noise.gyro * normal(random)});
+        }
+        const double outputs[] = {noise.angle * normal(random), noise.gyro * normal(random)};
+        bank.predict({0.2, &omega, readings, times.data(), between.data()}, outputs);
+        bank.update(outputs);
+      }
+      bank.moments(mean, covariance);
+      // Of what it was drawn from, the truth is anywhere: 0.75 is the mean of that.
+      const double error = mean[mean.size() - 1] - 0.75, sigma = std::sqrt(covariance.bottomRightCorner<1, 1>()(0));
+      inside += std::abs(error) < 0.5 * sigma;
+      shift += error / 20.0;
+      least = std::min(least, sigma);
+      ++count;
+    }
+    EXPECT_GE(inside, 18) << "of " << count << " with " << readings << " readings between the nodes";
+    EXPECT_LT(std::abs(shift), 0.06) << readings;
+    EXPECT_GT(least, 0.2) << readings << " readings: a standard deviation of 0.3 stays as large as it was, nearly";
+  }
+}
+
+/// Readings within one interval say the same of a law: with twenty, a law is no more probable than with one.
+TEST(PriorBank, WeighsLawsByOneReadingOfAnInterval) {
+  const TurntableNoise noise{.angle = 1.0, .gyro = 0.01, .omega = 1e-4};
+  const auto model = turntable();
+  double weight[2] = {};
+  for (const bool often : {false, true}) {
+    PriorBank bank(model, of_two_laws(noise, "{sigma: 0.01, along: time, course: ramp, mean: 0.8, mean_sigma: 0.01}",
+                                      "{sigma: 0.5, along: time, course: ramp, mean: 0.8, mean_sigma: 0.01}"));
+    bank.reset(Eigen::VectorXd::Zero(model->state_count()),
+               Eigen::MatrixXd::Identity(model->state_count(), model->state_count()) * 1e-4);
+    const double omega = 0.5, outputs[] = {0.08, 0.4};
+    std::vector<double> times, between;
+    for (int i = 1; i < 20; ++i) {
+      times.push_back(0.01 * i);
+      between.insert(between.end(), {std::numeric_limits<double>::quiet_NaN(), 0.4});
+    }
+    const std::vector<double> before(bank.weights().begin(), bank.weights().end());
+    bank.predict({0.2, &omega, often ? 19 : 0, times.data(), between.data()}, outputs);
+    bank.update(outputs);
+    weight[often] = bank.weights()[0];
+    EXPECT_GT(weight[often], 0.5) << "the calm law is right";
+  }
+  EXPECT_LT(weight[1], weight[0]);
+}
+
+/// An edge of the ground within an interval is an innovation of tens of standard deviations: laws that know nothing of
+/// edges lay it on traction and drive, and no more of it than three standard deviations.
+TEST(PriorBank, TakesNoMoreOfAnEdgeThanThreeStandardDeviations) {
+  const TurntableNoise noise{.angle = 1.0, .gyro = 0.002, .omega = 0.02};
+  const auto model = turntable();
+  PriorBank bank(model, of_two_laws(noise, "{sigma: 0.01, along: time, course: ramp, mean: 0.9, mean_sigma: 0.01}",
+                                    "{sigma: 0.02, along: time, course: ramp, mean: 0.9, mean_sigma: 0.01}"));
+  bank.reset(Eigen::VectorXd::Zero(model->state_count()),
+             Eigen::MatrixXd::Identity(model->state_count(), model->state_count()) * 1e-6);
+  Eigen::VectorXd before, mean;
+  Eigen::MatrixXd spread, covariance;
+  const double omega = 0.5, nan = std::numeric_limits<double>::quiet_NaN();
+  for (int k = 0; k < 20; ++k) {
+    const double outputs[] = {nan, (k < 19 ? 0.9 : 0.3) * omega};
+    if (k == 19) bank.moments(before, spread);
+    bank.predict({.duration = 0.2, .inputs = &omega}, outputs);
+    bank.update(outputs);
+  }
+  bank.moments(mean, covariance);
+  const Eigen::Index kappa = mean.size() - 1;
+  EXPECT_LT(mean[kappa], before[kappa]);
+  EXPECT_GT(mean[kappa], before[kappa] - 3.5 * std::sqrt(spread(kappa, kappa) + 4e-4 * 0.2));
 }
 
 TEST(PriorBank, RefusesWhatDoesNotFit) {
