@@ -302,9 +302,16 @@ void HorizonLinearisation::write_new_limits(const Iterate& iterate, int end, con
   }
   const int first_kept = 1, last_kept = std::min(end, N) - 1;  // the first and the last node have rows of their own
   write(0, std::min(first_kept - 1, N));
-  for (int k = 0; k < count; ++k)
-    if (unknown[k] >= first_kept && unknown[k] <= last_kept) write(unknown[k], unknown[k]);
-  if (std::max(last_kept + 1, first_kept) <= N) write(std::max(last_kept + 1, first_kept), N);
+  // Stages that follow each other are evaluated together, which takes as long as one of them does.
+  int first_new = std::max(last_kept + 1, first_kept);
+  int others = count;
+  while (others > 0 && unknown[others - 1] >= first_kept && unknown[others - 1] >= first_new - 1) {
+    first_new = std::min(first_new, unknown[others - 1]);
+    --others;
+  }
+  for (int k = 0; k < others; ++k)
+    if (unknown[k] >= first_kept) write(unknown[k], unknown[k]);
+  if (first_new <= N) write(first_new, N);
 }
 
 /// Whether the problem has simulated this interval from the same numbers.

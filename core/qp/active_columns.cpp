@@ -177,12 +177,27 @@ bool DualActiveSet::factor_columns(int first, bool may_leave_out) noexcept {
   return true;
 }
 
+/// Without row k the factor has one entry beyond the diagonal in each row that follows; rotations of its columns remove
+/// these (Golub & Van Loan 2013, section 6.5.4).
 void DualActiveSet::drop_column(int k) noexcept {
   let_go(columns_[k]);
   columns_.erase(columns_.begin() + k);
-  std::copy(multipliers_.begin() + k + 1, multipliers_.begin() + column_count() + 1, multipliers_.begin() + k);
-  // A principal submatrix of a positive definite matrix is positive definite.
-  factor_columns(k, true);
+  const int count = column_count();
+  std::copy(multipliers_.begin() + k + 1, multipliers_.begin() + count + 1, multipliers_.begin() + k);
+  for (int r = k; r < count; ++r) std::copy_n(factor_row(r + 1), r + 2, factor_row(r));
+  for (int j = k; j < count; ++j) {
+    double* row = factor_row(j);
+    const double left = row[j], diagonal = 1.0 / row[j + 1];
+    const double reciprocal = 1.0 / std::sqrt(left * left + diagonal * diagonal);
+    const double cosine = left * reciprocal, sine = diagonal * reciprocal;
+    row[j] = reciprocal;
+    for (int r = j + 1; r < count; ++r) {
+      double* pair = factor_row(r) + j;
+      const double first = pair[0], second = pair[1];
+      pair[0] = cosine * first + sine * second;
+      pair[1] = cosine * second - sine * first;
+    }
+  }
 }
 
 }  // namespace rhec

@@ -137,7 +137,8 @@ bool StageQpSolver::solve_augmented(const StageQp& qp, Iterate& step, Clock::tim
       }
       if (outcome != DualActiveSet::Outcome::solved || out_of_time_) break;
     }
-    if (out_of_time_) break;
+    // Where each has to be cheap: a larger weight seldom helps if one did not.
+    if (out_of_time_ || is_cheap_) break;
   }
   active_ = guessed_;
   is_convexified_ = is_dual_ = has_fitted_ = false;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 #include <utility>
 
 #include "rhec/core/base/infinity.hpp"
@@ -12,19 +13,25 @@
 namespace rhec {
 namespace {
 
-// A solution is accepted if active bounds are met to within this fraction of the tolerance for violations.
-constexpr double exactness = 0.1;
+// A solution is accepted if active bounds are met to within this fraction of the tolerance for violations. Of QPs that
+// were convexified, whose columns are nearly dependent, rounding leaves a tenth or two.
+constexpr double exactness = 0.5;
 // With more violated bounds, the allowed number of changes is unlikely to suffice.
 constexpr int violated_for_each_column = 2;
 // So many of a batch of sensitivities are for bounds that are likely to be active, the others for those that are
 // violated.
 constexpr int most_foreseen = 6;
+// Places that a batch keeps for bounds that enter when columns of controls are chosen.
+constexpr int few_entering = 3;
 // Number of solutions with an unchanged active set before rounding errors are assumed, and how many of them are
 // combined from sensitivities.
 constexpr int max_refinements = 4, max_combined = 2;
 // With limits the interior-point method, which comes next, takes as long as some hundred of them. Before, columns of
 // controls are held.
-constexpr int max_refinements_with_limits = 8, refinements_before_holding = 1;
+constexpr int max_refinements_with_limits = 8, refinements_before_holding = 3;
+// With limits, what refinement may leave of the misses: where rounding prevents more, the interior-point method gets no
+// further either, and takes a hundred times as long.
+constexpr double rounding = 10.0;
 
 }  // namespace
 
@@ -146,14 +153,16 @@ void DualActiveSet::prepare(const StageQp& qp, Riccati& riccati, const ActiveSet
   if (claimed) take_claims(qp, *claimed);
   // Where sensitivities are needed anyway, the ends of a sequence of active bounds are columns: these are dropped more
   // often than those between, and a column is dropped without another factorisation.
+  // All are columns where one batch has room for them.
   const int first_end = column_count();
   if (has_limits_ && first_end > 0 && first_end < batch_size) {
+    const bool are_few = first_end + static_cast<int>(held_places_.size()) <= batch_size;
     std::erase_if(held_places_, [&](int place) {
       const int stage = place / stride_, j = place % stride_;
       const auto goes_on = [&](int other) {
         return other < 0 || other >= qp.intervals() || claimed->row(other)[j] == side_[place];
       };
-      if (column_count() == most_foreseen || (goes_on(stage - 1) && goes_on(stage + 1))) return false;
+      if (!are_few && (column_count() == most_foreseen || (goes_on(stage - 1) && goes_on(stage + 1)))) return false;
       held_.row(stage)[j] = 0;
       hold_[place] = Hold::column;
       multipliers_[column_count()] = 0.0;
@@ -209,8 +218,7 @@ bool DualActiveSet::refactor(const StageQp& qp, Riccati& riccati) noexcept {
     }
   }
   columns_.resize(kept);
-  // One is left for a bound that enters.
-  const int used = (kept + 1) % batch_size, room = used > 0 ? batch_size - used : 0;
+  const int used = (kept + few_entering) % batch_size, room = used > 0 ? batch_size - used : 0;
   const auto is_sooner = [this](int a, int b) { return violation_[a] < violation_[b]; };
   if (has_limits_ && room > 0 && kept + room <= most_columns_)
     std::sort(held_places_.begin(), held_places_.end(), is_sooner);
@@ -406,25 +414,24 @@ void DualActiveSet::append_column(int place, double square, double multiplier) n
   factor_row(count)[count] = 1.0 / std::sqrt(square);
 }
 
+/// Adds a violated bound and, with limits, those of the bounds with sensitivities that are violated then.
 DualActiveSet::Outcome DualActiveSet::add(const StageQp& qp, Riccati& riccati, int entering,
                                           Clock::time_point deadline) noexcept {
-  // The multiplier grows towards the violated side; that of a saturated limit which is no longer violated shrinks.
-  const bool was_saturated = hold_[entering] == Hold::saturated, is_capped = has_limits_ && is_soft(entering);
-  const int side = was_saturated ? -side_[entering] : value_[entering] < lower_[entering] ? -1 : 1;
-  double multiplier = 0.0;
-  if (was_saturated) {
-    std::erase(saturated_, entering);
-    multiplier = side_[entering] * linear(entering);
-  } else {
-    side_[entering] = static_cast<std::int8_t>(side);
-    if (is_capped && linear(entering) == 0.0) relaxed_[entering] = 1;
-  }
   // Values change with the multipliers, but only few of them are needed before the entering bound is met.
   Weights changes{};
   bool has_changes = false;
+  int used = 0;  // batches from there on are empty
+  GatheredPlaces others;
+  bool has_others = false;
+  const auto count_used = [&] {
+    used = batch_count_;
+    while (used > 0 && batches_[used - 1].count == 0) --used;
+    has_others = false;
+  };
+  count_used();
   const auto sum_at = [&](const Weights& weights, int place) {
     double sum = 0.0;
-    for (int k = 0; k < batch_count_; ++k)
+    for (int k = 0; k < used; ++k)
       if (batches_[k].count > 0) sum += dot(weights[k].data(), sensitivities_at(k, place), batch_size);
     return sum;
   };
@@ -434,11 +441,55 @@ DualActiveSet::Outcome DualActiveSet::add(const StageQp& qp, Riccati& riccati, i
     has_changes = false;
     changes = {};
   };
+  // The multiplier grows towards the violated side; that of a saturated limit which is no longer violated shrinks.
+  bool was_saturated = false, is_capped = false;
+  int side = 0;
+  double multiplier = 0.0;
+  const auto enter = [&](double value) {
+    was_saturated = hold_[entering] == Hold::saturated;
+    is_capped = has_limits_ && is_soft(entering);
+    side = was_saturated ? -side_[entering] : value < lower_[entering] ? -1 : 1;
+    multiplier = 0.0;
+    if (was_saturated) {
+      std::erase(saturated_, entering);
+      multiplier = side_[entering] * linear(entering);
+    } else {
+      side_[entering] = static_cast<std::int8_t>(side);
+      if (is_capped && linear(entering) == 0.0) relaxed_[entering] = 1;
+    }
+  };
+  // With limits, the next one is looked for among the bounds that have sensitivities, where most are, before all values
+  // are written.
+  const auto enter_next = [&] {
+    if (!has_limits_ || used > GatheredPlaces::most_batches) return false;
+    if (!has_others) {
+      others.clear();
+      for (int k = 0; k < used; ++k)
+        for (int c = 0; c < batches_[k].count; ++c)
+          if (const int place = batches_[k].of[c]; number_[place] == k * batch_size + c) others.add(place);
+      for (int k = 0; k < used; ++k) others.add_batch(batches_[k].count > 0 ? sensitivities_at(k, 0) : nullptr);
+      has_others = true;
+    }
+    const std::span<const double> values = others.values(value_.data(), changes);
+    double largest = 0.0, value = 0.0;
+    for (std::size_t k = 0; k < values.size(); ++k) {
+      const int place = others.places()[k];
+      const double violation = std::max(least_[place] - values[k], values[k] - most_[place]);
+      if (!(violation > 0.0)) continue;
+      const double gain = violation * violation / -sensitivity(place, place);
+      if (gain > largest) largest = gain, entering = place, value = values[k];
+    }
+    if (largest > 0.0) enter(value);
+    return largest > 0.0;
+  };
+  enter(value_[entering]);
   for (;;) {
     if (++changes_ > most_changes_) return Outcome::too_much;
     if (is_past(deadline)) return Outcome::out_of_time;
-    if (number_[entering] == none && !find_sensitivities_of_next(qp, riccati, &entering, 1, -infinity))
-      return Outcome::too_much;
+    if (number_[entering] == none) {
+      if (!find_sensitivities_of_next(qp, riccati, &entering, 1, -infinity)) return Outcome::too_much;
+      count_used();
+    }
     // Change of values and multipliers while the entering multiplier grows and the active bounds stay met.
     const int count = column_count();
     double pull[max_columns_with_limits], row[max_columns_with_limits];
@@ -486,8 +537,8 @@ DualActiveSet::Outcome DualActiveSet::add(const StageQp& qp, Riccati& riccati, i
     multiplier += side * length;
     for (int k = 0; k < count; ++k) multipliers_[k] -= length * pull[k];
     has_changes = true;
-    for (int k = 0; k < batch_count_; ++k)
-      for (int c = 0; batches_[k].count > 0 && c < batch_size; ++c) changes[k][c] += length * direction[k][c];
+    for (int k = 0; k < used; ++k)
+      for (int c = 0; c < batch_size; ++c) changes[k][c] += length * direction[k][c];
     if (blocking_held != none) {
       write_values();
       std::erase(held_places_, blocking_held);
@@ -497,27 +548,33 @@ DualActiveSet::Outcome DualActiveSet::add(const StageQp& qp, Riccati& riccati, i
       find_violations();
       if (!find_sensitivities_of_columns(qp, riccati, has_limits_) || !factor_columns(0, false))
         return Outcome::too_much;
+      count_used();
     } else if (blocking_column != none) {
       if (!pass_end(blocking_column, grows)) return Outcome::too_much;
     } else if (reaches_end) {
       if (was_saturated || softness(entering) == 0.0) {
-        write_values();
         if (was_saturated) {
           let_go(entering);
         } else {
           saturated_.push_back(entering);
           saturate(entering);
         }
+        if (enter_next()) continue;
+        write_values();
         return Outcome::solved;
       }
       relaxed_[entering] = 1;
       multiplier = side * linear(entering);
     } else {
       if (count == most_columns_) return Outcome::too_much;
-      write_values();
-      value_[entering] = target(entering, multiplier);
       std::copy_n(row, count, factor_row(count));
       append_column(entering, square, multiplier);
+      const int met = entering;
+      const double value = target(entering, multiplier);
+      if (enter_next()) continue;
+      write_values();
+      value_[met] = value;
+      if (has_limits_ && largest_miss() > exactness) return_to_bounds(riccati);
       return Outcome::solved;
     }
   }
@@ -580,6 +637,7 @@ DualActiveSet::Found DualActiveSet::find_values(const StageQp& qp, Riccati& ricc
 
 DualActiveSet::Outcome DualActiveSet::solve(const StageQp& qp, Riccati& riccati, ActiveSet& active, Iterate& step,
                                             Clock::time_point deadline) noexcept {
+  if (!is_convex_) return Outcome::not_convex;
   const bool has_claims = !columns_.empty() || !held_places_.empty() || !saturated_.empty();
   if (has_claims && !take_bounds(qp)) {
     claimed_ = active;
@@ -621,6 +679,8 @@ DualActiveSet::Outcome DualActiveSet::solve(const StageQp& qp, Riccati& riccati,
   for (int refinements = 0; refinements < most_refinements; ++refinements) {
     if (!is_convex_) return give_up_not_convex();
     const int changes_before = changes_;
+    const auto active_count = [this] { return static_cast<int>(held_places_.size()) + column_count(); };
+    const int claims = active_count();
     const Found found = find_values(qp, riccati, refinements < max_combined, step);
     if (found == Found::nothing) return Outcome::too_much;
     if (found == Found::solution) {
@@ -628,11 +688,22 @@ DualActiveSet::Outcome DualActiveSet::solve(const StageQp& qp, Riccati& riccati,
       return Outcome::solved;
     }
     bool needs_factor = drop_wrong(riccati);
+    if (has_limits_ && needs_factor && changes_before == 0 && 2 * active_count() < claims) {
+      // The claims are mostly wrong: those that are held would only be released one after the other.
+      std::erase_if(held_places_, [this](int place) {
+        if (is_equality_bound(place)) return false;
+        let_go(place);
+        ++changes_;
+        return true;
+      });
+    }
     Violations violations = find_violations();
     if (violations.count > violated_for_each_column * most_columns_) return Outcome::too_much;
     if (!needs_factor && may_add_together && violations.worst != none) {
       may_add_together = false;
-      if (!add_controls_together(qp, riccati, violations.worst)) return Outcome::too_much;
+      // Where a limit comes first, most of the controls would be released again.
+      if (!(has_limits_ && is_limit(choose(violations.worst))) && !add_controls_together(qp, riccati, violations.worst))
+        return Outcome::too_much;
       needs_factor = drop_wrong(riccati);
       violations = find_violations();
     }
@@ -660,7 +731,18 @@ DualActiveSet::Outcome DualActiveSet::solve(const StageQp& qp, Riccati& riccati,
       if (!refactor(qp, riccati)) return give_up_not_convex();
     }
   }
-  return Outcome::too_much;
+  if (!has_limits_) return Outcome::too_much;
+  // The active set is right, and what is left of the misses is rounding.
+  std::copy_n(step.row(0), places_, value_.begin());
+  find_limit_values(qp, step);
+  const Violations violations = find_violations();
+  const auto is_rounding = [this](int place) {
+    return violation_[place] <= rounding * bound_tolerance * (1.0 + std::abs(value_[place]));
+  };
+  if (largest_miss() > rounding || (violations.worst != none && !is_rounding(violations.worst)))
+    return Outcome::too_much;
+  write(qp, active, step);
+  return Outcome::solved;
 }
 
 void DualActiveSet::write(const StageQp& qp, ActiveSet& active, Iterate& step) const noexcept {

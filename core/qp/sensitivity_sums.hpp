@@ -1,7 +1,12 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
+#include <span>
+
+#include "rhec/core/kernels/kernel_sets.hpp"
+#include "rhec/core/kernels/riccati_kernels.hpp"
 
 namespace rhec {
 
@@ -22,5 +27,49 @@ void for_each_weighted(const Weights& weights, const Function& function) {
   for (std::size_t k = 0; k < weights.size(); ++k)
     if (!std::all_of(weights[k].begin(), weights[k].end(), is_zero)) function(static_cast<int>(k));
 }
+
+/// A few places whose values are wanted often while sensitivities are added to them with new weights: their
+/// sensitivities, one batch behind the other.
+class GatheredPlaces {
+ public:
+  static constexpr int most = 48, most_batches = 6;
+  static constexpr int size = response_batch;
+
+  void clear() noexcept { count_ = batches_ = 0; }
+  void add(int place) noexcept {
+    if (count_ < most) places_[count_++] = place;
+  }
+  /// `values` are a batch's sensitivities at all places; null for one that is empty. There is room for `most_batches`.
+  void add_batch(const double* values) noexcept {
+    double* to = sensitivities_.data() + static_cast<std::ptrdiff_t>(batches_++) * most * size;
+    if (!values) {
+      std::fill(to, to + padded() * size, 0.0);
+      return;
+    }
+    for (int k = 0; k < count_; ++k)
+      std::copy_n(values + static_cast<std::ptrdiff_t>(places_[k]) * size, size, to + k * size);
+    // Sums are found eight at a time.
+    std::fill(to + count_ * size, to + padded() * size, 0.0);
+  }
+  std::span<const int> places() const noexcept { return {places_.data(), static_cast<std::size_t>(count_)}; }
+  /// The values of the places once the weighted sensitivities of all batches are added.
+  template <class Weights>
+  std::span<const double> values(const double* before, const Weights& weights) noexcept {
+    for (int k = 0; k < count_; ++k) values_[k] = before[places_[k]];
+    std::fill(values_.begin() + count_, values_.begin() + padded(), 0.0);
+    for (int k = 0; k < batches_; ++k)
+      riccati_kernels().combine(sensitivities_.data() + static_cast<std::ptrdiff_t>(k) * most * size, weights[k].data(),
+                                values_.data(), padded());
+    return {values_.data(), static_cast<std::size_t>(count_)};
+  }
+
+ private:
+  int padded() const noexcept { return (count_ + size - 1) / size * size; }
+
+  int count_ = 0, batches_ = 0;
+  std::array<int, most> places_;  // NOLINT(*-member-init): set as far as they count
+  alignas(64) std::array<double, most> values_;
+  alignas(64) std::array<double, most_batches * most * size> sensitivities_;
+};
 
 }  // namespace rhec

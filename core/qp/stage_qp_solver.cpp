@@ -22,6 +22,10 @@ constexpr StageQpSolver::Accuracy ready_with_limits{1e-6, 1e-5};
 // If polishing does not settle, the interior-point method itself must be accurate.
 constexpr StageQpSolver::Accuracy on_its_own{1e-12, 1e-10};
 
+/// Whether a QP is convexified before anything else: the last one was not convex, each has to be cheap, and it is not
+/// the turn of an augmentation.
+bool is_convexified_first(bool is_cheap, int not_convex, int wait) { return is_cheap && not_convex > 0 && wait > 1; }
+
 }  // namespace
 
 StageQpSolver::StageQpSolver(const Capacity& capacity)
@@ -91,7 +95,7 @@ bool StageQpSolver::claim_is_likely(const StageQp& qp) const noexcept {
 void StageQpSolver::prepare(const StageQp& qp) noexcept {
   if (claim_is_likely(qp)) {
     factor(qp);
-  } else {
+  } else if (!qp.has_limits() || !is_convexified_first(is_cheap_, not_convex_, wait_)) {
     prepare_changes(qp);
   }
 }
@@ -181,13 +185,18 @@ StageQpSolver::Outcome StageQpSolver::solve_limited(const StageQp& qp, Iterate& 
   out_of_time_ = false;
   if (mark_bounds(qp, step, bound_tolerance, marks_.data()) || limits_cross(qp, bound_tolerance))
     return Outcome::infeasible;
-  auto outcome = solve_from_guess(qp, step, deadline);
-  not_convex_ = outcome == DualActiveSet::Outcome::not_convex ? not_convex_ + 1 : 0;
+  const bool is_first = is_convexified_first(is_cheap_, not_convex_, wait_);
+  auto outcome = is_first ? DualActiveSet::Outcome::not_convex : solve_from_guess(qp, step, deadline);
+  if (!is_first) not_convex_ = outcome == DualActiveSet::Outcome::not_convex ? not_convex_ + 1 : 0;
   if (outcome == DualActiveSet::Outcome::not_convex) {
-    if (is_past(deadline)) return Outcome::out_of_time;
-    if (may_augment() && solve_augmented(qp, step, deadline)) return Outcome::active_set;
+    if (!is_first && is_past(deadline)) return Outcome::out_of_time;
+    if (!is_first && may_augment() && solve_augmented(qp, step, deadline)) return Outcome::active_set;
     if (out_of_time_) return Outcome::out_of_time;
     const StageQp& convex = convexify_limited(qp);
+    if (is_first) {
+      not_convex_ = is_convexified_ ? not_convex_ + 1 : 0;
+      --wait_;
+    }
     prepared_ = false;
     outcome = solve_from_guess(convex, step, deadline);
   }
@@ -200,7 +209,10 @@ DualActiveSet::Outcome StageQpSolver::solve_from_guess(const StageQp& qp, Iterat
                                                        Clock::time_point deadline) noexcept {
   if (!prepared_) prepare_changes(qp);
   prepared_ = false;
-  const auto outcome = dual_.solve(qp, riccati_, active_, step, deadline);
+  // If the QP was convex only with all its claims held, it rarely is once some of them are released.
+  const bool is_open = is_cheap_ && qp.has_limits() && !is_convexified_ && dual_.factorisations() > 1;
+  const auto outcome =
+      is_open ? DualActiveSet::Outcome::not_convex : dual_.solve(qp, riccati_, active_, step, deadline);
   is_dual_ = outcome == DualActiveSet::Outcome::solved;
   factorisations_ += dual_.factorisations();
   return outcome;

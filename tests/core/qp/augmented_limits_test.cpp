@@ -119,5 +119,74 @@ TEST(AugmentedLimits, WaitForASecondQpWhereEachHasToBeCheap) {
   }
 }
 
+/// Of x and u, with u_0 >= -1 as a limit and |u_1| <= 1: 1/2 x^2 + 1/2 u_0^2 + 4 u_0 + 1/2 curvature u_1^2 + pull u_1.
+StageQp two_controls(double curvature, double pull) {
+  constexpr double infinity = std::numeric_limits<double>::infinity();
+  StageQp qp(Capacity{1, 1, 2, 1});
+  qp.set_intervals(1);
+  qp.initial_state_is_given = true;
+  qp.set_sizes(0, 1, 2);
+  qp.set_sizes(1, 1, 0);
+  qp.set_limits(0, 1);
+  qp.AB(0)[0] = 1.0;
+  qp.control_lower(0)[0] = -infinity;
+  qp.control_upper(0)[0] = infinity;
+  qp.control_lower(0)[1] = -1.0;
+  qp.control_upper(0)[1] = 1.0;
+  qp.H(0)[0] = qp.H(1)[0] = qp.H(0)[qp.stride() + 1] = 1.0;
+  qp.H(0)[2 * qp.stride() + 2] = curvature;
+  qp.h(0)[1] = 4.0;
+  qp.h(0)[2] = pull;
+  qp.G(0)[1] = 1.0;
+  qp.limit_lower(0)[0] = -1.0;
+  qp.limit_upper(0)[0] = infinity;
+  qp.limit_linear(0)[0] = infinity;
+  return qp;
+}
+
+TEST(AugmentedLimits, GiveWayToConvexificationWhereTheyHaveFailed) {
+  // The limit does not help u_1.
+  const StageQp bent = two_controls(-1.0, 0.5), convex = two_controls(1.0, 0.5);
+  Iterate claim(bent.capacity()), step(bent.capacity());
+  claim.limit_bound(0)[0] = -3.0;
+  StageQpSolver solver(bent.capacity());
+  solver.set_cheap(true);
+  const auto factorisations = [&](const StageQp& qp) {
+    solver.guess_from(qp, claim);
+    solver.prepare(qp);
+    EXPECT_EQ(solver.solve(qp, step), StageQpSolver::Outcome::active_set);
+    EXPECT_NEAR(step.control(0)[0], -1.0, 1e-9);
+    EXPECT_NEAR(step.control(0)[1], -0.5, 1e-9);
+    EXPECT_EQ(solver.was_convexified(), &qp == &bent);
+    return solver.factorisations();
+  };
+  // Of the first one it is seen that it is not convex, of the second one also that the limit does not make it so.
+  EXPECT_EQ(factorisations(bent), 3);
+  EXPECT_EQ(factorisations(bent), 4);
+  for (int sample = 2; sample < 17; ++sample) EXPECT_EQ(factorisations(bent), 2) << sample;
+  EXPECT_EQ(factorisations(bent), 4) << "now and then it is tried again";
+  EXPECT_EQ(factorisations(bent), 2);
+  EXPECT_EQ(factorisations(convex), 2) << "which shows that it is convex";
+  EXPECT_EQ(factorisations(convex), 1);
+}
+
+TEST(AugmentedLimits, AreNotAskedForWhatIsConvexOnlyWithAllItsClaims) {
+  const StageQp qp = two_controls(-1.0, -2.0);
+  Iterate claim(qp.capacity()), step(qp.capacity());
+  claim.limit_bound(0)[0] = -3.0;
+  claim.control_bound(0)[1] = 3.0;
+  for (const bool is_cheap : {false, true}) {
+    StageQpSolver solver(qp.capacity());
+    solver.set_cheap(is_cheap);
+    solver.guess_from(qp, claim);
+    solver.prepare(qp);
+    ASSERT_EQ(solver.solve(qp, step), StageQpSolver::Outcome::active_set);
+    EXPECT_EQ(solver.was_convexified(), is_cheap);
+    EXPECT_NEAR(step.control(0)[0], -1.0, 1e-9);
+    EXPECT_NEAR(step.control(0)[1], 1.0, 1e-9);
+    EXPECT_NEAR(step.control_bound(0)[1], is_cheap ? 1.0 : 3.0, 1e-9);
+  }
+}
+
 }  // namespace augmented_limits_test
 }  // namespace rhec

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -93,6 +94,43 @@ TEST(DualLimits, SolvesWithRowsThatChangeAfterThePreparation) {
     }
   }
   EXPECT_GT(active, 500);
+}
+
+TEST(DualLimits, AcceptWhatRoundingLeaves) {
+  // Only the last control is cheap enough to bring a state of some millions to zero, to which numbers of that size do
+  // not add up by less than a few 1e-10.
+  constexpr int N = 4;
+  StageQp qp(Capacity{N, 1, 1, 1});
+  qp.set_intervals(N);
+  qp.initial_state_is_given = true;
+  for (int i = 0; i <= N; ++i) {
+    qp.set_sizes(i, 1, i < N ? 1 : 0);
+    qp.set_limits(i, i < N ? 0 : 1);
+    qp.state_lower(i)[0] = -infinity;
+    qp.state_upper(i)[0] = infinity;
+    if (i == N) continue;
+    qp.control_lower(i)[0] = -infinity;
+    qp.control_upper(i)[0] = infinity;
+    qp.AB(i)[0] = 113.0;
+    qp.AB(i)[1] = 1.0;
+    qp.H(i)[qp.stride() + 1] = i + 1 < N ? 1e12 : 1.0;
+  }
+  qp.G(N)[0] = 1.0;
+  qp.limit_lower(N)[0] = -infinity;
+  qp.limit_upper(N)[0] = 0.0;
+  qp.limit_linear(N)[0] = infinity;
+  double largest = 0.0;
+  for (int trial = 0; trial < 100; ++trial) {
+    qp.b(0)[0] = 1.0 + 0.004 * trial;
+    StageQpSolver solver(qp.capacity());
+    Iterate step(qp.capacity());
+    solver.guess_from(qp, step);
+    EXPECT_EQ(solver.solve(qp, step), StageQpSolver::Outcome::active_set) << "trial " << trial;
+    EXPECT_NEAR(step.state(N)[0], 0.0, 1e-9) << "trial " << trial;
+    EXPECT_NEAR(step.limit_bound(N)[0], -step.control(N - 1)[0], 1e-3);
+    largest = std::max(largest, std::abs(step.state(N)[0]));
+  }
+  EXPECT_GT(largest, 1e-10) << "beyond the tolerance for violations";
 }
 
 }  // namespace dual_limits_test
