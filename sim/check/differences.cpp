@@ -10,8 +10,8 @@ namespace rhec::sim {
 namespace {
 
 constexpr double not_known = std::numeric_limits<double>::quiet_NaN();
-constexpr double most_scales = 10.0;                            // wider bounds do not count as typical values
-constexpr double distances[] = {2e-2, 2e-3, 2e-4, 2e-5, 2e-6};  // spacing of difference points, in scales
+constexpr double most_scales = 10.0;                           // wider bounds do not count as typical values
+constexpr double spacings[] = {2e-2, 2e-3, 2e-4, 2e-5, 2e-6};  // spacing of difference points, in scales
 
 double& value_at(StagePoints& points, const ModelDescription& about, int stage, int entry) {
   const int nx = static_cast<int>(about.states.size()), nu = static_cast<int>(about.inputs.size()),
@@ -37,7 +37,7 @@ Differences differences(const StagePoints& stages, const ModelDescription& about
   StagePoints moved = stages;
   std::vector<double> start(stages.count);
   for (int i = 0; i < stages.count; ++i) start[i] = value_at(moved, about, i, entry);
-  for (const double distance : distances) {
+  for (const double distance : spacings) {
     const double h = distance * step;
     std::vector<double> slope(count, 0.0), largest(count, 0.0);
     for (const auto& [steps, weight] : {std::pair{-2, 1.0}, {-1, -8.0}, {1, 8.0}, {2, -1.0}}) {

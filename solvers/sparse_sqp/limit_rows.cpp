@@ -7,26 +7,26 @@
 
 namespace rhec::sparse_sqp {
 
-using State = LimitRows::State;
+using RowState = LimitRows::State;
 
-void LimitRows::take_structure(int rows) { states_.assign(rows, State::both); }
+void LimitRows::take_structure(int rows) { states_.assign(rows, RowState::both); }
 
 void LimitRows::guess(const Data& limits, const double* multipliers) {
   for (const int r : limits.rows) {
     const double multiplier = multipliers[r], price = limits.linear[r];
-    State& state = states_[r];
+    RowState& state = states_[r];
     if (multiplier < 0.0 && -multiplier >= price && limits.lower[r] > -infinity)
-      state = State::below;
+      state = RowState::below;
     else if (multiplier > 0.0 && multiplier >= price && limits.upper[r] < infinity)
-      state = State::above;
+      state = RowState::above;
     else if (limits.lower[r] == limits.upper[r])
-      state = State::both;
+      state = RowState::both;
     else if (multiplier < 0.0 && limits.lower[r] > -infinity)
-      state = State::lower;
+      state = RowState::lower;
     else if (multiplier > 0.0 && limits.upper[r] < infinity)
-      state = State::upper;
+      state = RowState::upper;
     else
-      state = State::off;
+      state = RowState::off;
   }
 }
 
@@ -34,20 +34,20 @@ void LimitRows::describe(const Data& limits, double* multipliers) const {
   for (const int r : limits.rows) {
     const double price = limits.linear[r], within = price < infinity ? 0.5 * price : 1.0;
     switch (states_[r]) {
-      case State::off:
-      case State::both:
+      case RowState::off:
+      case RowState::both:
         multipliers[r] = 0.0;
         break;
-      case State::lower:
+      case RowState::lower:
         multipliers[r] = -within;
         break;
-      case State::upper:
+      case RowState::upper:
         multipliers[r] = within;
         break;
-      case State::below:
+      case RowState::below:
         multipliers[r] = -price - 1.0;
         break;
-      case State::above:
+      case RowState::above:
         multipliers[r] = price + 1.0;
         break;
     }
@@ -55,18 +55,19 @@ void LimitRows::describe(const Data& limits, double* multipliers) const {
 }
 
 bool LimitRows::is_known(const Data& limits, int r) const noexcept {
-  const State state = states_[r];
-  return state == State::off || ((state == State::below || state == State::above) && limits.quadratic[r] == 0.0);
+  const RowState state = states_[r];
+  return state == RowState::off ||
+         ((state == RowState::below || state == RowState::above) && limits.quadratic[r] == 0.0);
 }
 
 double LimitRows::known_multiplier(const Data& limits, int r) const noexcept {
-  if (states_[r] == State::off) return 0.0;
-  return states_[r] == State::above ? limits.linear[r] : -limits.linear[r];
+  if (states_[r] == RowState::off) return 0.0;
+  return states_[r] == RowState::above ? limits.linear[r] : -limits.linear[r];
 }
 
 void LimitRows::write_matrix(const Data& limits, std::uint8_t* off, double* dual) const noexcept {
   for (const int r : limits.rows) {
-    const bool is_beyond = states_[r] == State::below || states_[r] == State::above;
+    const bool is_beyond = states_[r] == RowState::below || states_[r] == RowState::above;
     off[r] = is_known(limits, r);
     dual[r] = is_beyond && !off[r] ? 1.0 / limits.quadratic[r] : 0.0;
   }
@@ -75,16 +76,16 @@ void LimitRows::write_matrix(const Data& limits, std::uint8_t* off, double* dual
 double LimitRows::unmet(const Data& limits, int r, double value, double multiplier) const noexcept {
   if (is_known(limits, r)) return 0.0;
   switch (states_[r]) {
-    case State::off:
+    case RowState::off:
       break;
-    case State::lower:
-    case State::both:
+    case RowState::lower:
+    case RowState::both:
       return value - limits.lower[r];
-    case State::upper:
+    case RowState::upper:
       return value - limits.upper[r];
-    case State::below:
+    case RowState::below:
       return value - limits.lower[r] - (multiplier + limits.linear[r]) / limits.quadratic[r];
-    case State::above:
+    case RowState::above:
       return value - limits.upper[r] - (multiplier - limits.linear[r]) / limits.quadratic[r];
   }
   return 0.0;
@@ -99,36 +100,36 @@ LimitRows::Change LimitRows::update(const Data& limits, const double* values, co
     const bool is_below = value<lower - value_tolerance, is_above = value> upper + value_tolerance;
     // Without a linear weight there is nothing between off and beyond.
     const bool is_smooth = price == 0.0, is_equation = lower == upper;
-    const State at_lower = is_smooth ? State::below : is_equation ? State::both : State::lower;
-    const State at_upper = is_smooth ? State::above : is_equation ? State::both : State::upper;
+    const RowState at_lower = is_smooth ? RowState::below : is_equation ? RowState::both : RowState::lower;
+    const RowState at_upper = is_smooth ? RowState::above : is_equation ? RowState::both : RowState::upper;
     const bool falls_short =
         multiplier<-price - multiplier_tolerance, exceeds = multiplier> price + multiplier_tolerance;
-    State next = states_[r];
+    RowState next = states_[r];
     switch (states_[r]) {
-      case State::off:
+      case RowState::off:
         if (is_below) next = at_lower;
         if (is_above) next = at_upper;
         break;
-      case State::lower:
-        if (multiplier > multiplier_tolerance) next = State::off;
-        if (falls_short) next = State::below;
+      case RowState::lower:
+        if (multiplier > multiplier_tolerance) next = RowState::off;
+        if (falls_short) next = RowState::below;
         break;
-      case State::upper:
-        if (multiplier < -multiplier_tolerance) next = State::off;
-        if (exceeds) next = State::above;
+      case RowState::upper:
+        if (multiplier < -multiplier_tolerance) next = RowState::off;
+        if (exceeds) next = RowState::above;
         break;
-      case State::both:
-        if (falls_short) next = State::below;
-        if (exceeds) next = State::above;
+      case RowState::both:
+        if (falls_short) next = RowState::below;
+        if (exceeds) next = RowState::above;
         break;
-      case State::below:
-        if (value > lower + value_tolerance) next = is_smooth ? State::off : at_lower;
+      case RowState::below:
+        if (value > lower + value_tolerance) next = is_smooth ? RowState::off : at_lower;
         break;
-      case State::above:
-        if (value < upper - value_tolerance) next = is_smooth ? State::off : at_upper;
+      case RowState::above:
+        if (value < upper - value_tolerance) next = is_smooth ? RowState::off : at_upper;
         break;
     }
-    if (next != states_[r]) ++(next == State::off ? change.released : change.added);
+    if (next != states_[r]) ++(next == RowState::off ? change.released : change.added);
     states_[r] = next;
   }
   return change;
@@ -139,22 +140,22 @@ void LimitRows::clip(const Data& limits, double* multipliers) const noexcept {
     double& multiplier = multipliers[r];
     const double price = limits.linear[r];
     switch (states_[r]) {
-      case State::off:
+      case RowState::off:
         multiplier = 0.0;
         break;
-      case State::lower:
+      case RowState::lower:
         multiplier = std::clamp(multiplier, -price, 0.0);
         break;
-      case State::upper:
+      case RowState::upper:
         multiplier = std::clamp(multiplier, 0.0, price);
         break;
-      case State::both:
+      case RowState::both:
         multiplier = std::clamp(multiplier, -price, price);
         break;
-      case State::below:
+      case RowState::below:
         multiplier = std::min(multiplier, -price);
         break;
-      case State::above:
+      case RowState::above:
         multiplier = std::max(multiplier, price);
         break;
     }
