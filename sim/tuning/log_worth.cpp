@@ -21,7 +21,7 @@ constexpr std::size_t most_named = 6;  // confounded pairs
 constexpr int fewest_blocks = 10, most_blocks = 60, fixes_of_a_block = 10;
 constexpr double block_seconds = 30.0;
 // Estimators are chosen by these many rests of so many, at least.
-constexpr int rests_tried = 2, fewest_rests = 4;
+constexpr int rests_tried = 4, fewest_rests = 5;
 // Roughness is looked for at so many points, this far away in the coordinates; and so many points are told apart.
 constexpr int looks_about = 15;
 constexpr double nearby = 0.01;
