@@ -10,6 +10,7 @@
 #include "native_options.hpp"
 #include "rhec/core/ocp/iterate_checks.hpp"
 #include "rhec/plugins/kit/sdk.hpp"
+#include "violation_nlp.hpp"
 
 namespace rhec::ipopt {
 namespace {
@@ -24,10 +25,16 @@ constexpr int most_spare_iterations = 6;
 constexpr double near_solution = 1e-4;
 constexpr int most_polishes = 2;
 /// Iterations after which another kind of start is more promising. Runs that take longer are mostly those that wander
-/// in directions of negative curvature, or try to refute an infeasibility that is there.
+/// in directions of negative curvature, or try to meet limits that cannot be met.
 constexpr int patience = 150;
 /// A violation of the dynamics, or of limits, too large for rounding.
 constexpr double clear_violation = 1e-6;
+/// A point is stationary for the violation if its slope there, relative to the violation, is at most this.
+constexpr double flat = 3e-4;
+/// Of all solves of ViolationNlp together, which take up to 120 on the problems of the conformance suite.
+constexpr int most_iterations_of_violation = 300;
+constexpr int most_solves_of_violation = 5;
+constexpr double tolerance_of_violation = 1e-11;
 /// Initial barrier parameter of a warm start, relative to the guess' residual, and its limits.
 constexpr double warm_barrier_share = 1e-4;
 constexpr double smallest_warm_barrier = 1e-8;
@@ -149,7 +156,7 @@ void IpoptSolver::setup(const Ocp& ocp) {
   ocp_ = &ocp;
   scratch_.assign(ocp.scratch_size(), 0.0);
   assessed_ = StageQp(ocp.capacity(), OcpNlp::window);
-  guess_ = best_ = Iterate(ocp.capacity());
+  guess_ = best_ = nearest_ = Iterate(ocp.capacity());
   const std::lock_guard hold(backend_lock());
   nlp_ = new OcpNlp(ocp, options_.hessian);
 }
@@ -174,7 +181,7 @@ IpoptSolver::Start IpoptSolver::start_after(Start start, Ending ending) const no
 
 int IpoptSolver::iterations_of(Start start) const noexcept {
   const int left = std::max(options_.max_iterations - iterations_, 0);
-  return start == Start::adaptive && !claimed_infeasible_ ? left : std::min(left, patience);
+  return start == Start::adaptive ? left : std::min(left, patience);
 }
 
 void IpoptSolver::set_run_options(Start start, double barrier) {
@@ -233,7 +240,17 @@ double IpoptSolver::violation_of(const KktResidual& kkt) const noexcept {
   return ocp_->capacity().limits > 0 ? std::max(kkt.defect, kkt.bound_violation) : kkt.defect;
 }
 
-IpoptSolver::Ending IpoptSolver::run(Start start, const Iterate& from) {
+/// Runs Ipopt, and adds its own time to the sum.
+Ipopt::ApplicationReturnStatus IpoptSolver::optimize(const Ipopt::SmartPtr<Ipopt::TNLP>& nlp) {
+  const auto begin = Clock::now();
+  const double ours = nlp_->microseconds();
+  const auto outcome = application_->OptimizeTNLP(nlp);
+  backend_us_ += microseconds_since(begin) - (nlp_->microseconds() - ours);
+  return outcome;
+}
+
+IpoptSolver::Ending IpoptSolver::run(Start start) {
+  const Iterate& from = start == Start::polish ? best_ : start == Start::nearest ? nearest_ : guess_;
   double barrier = 0.0;
   if (start == Start::warm)
     barrier = std::clamp(warm_barrier_share * best_kkt_.largest(), smallest_warm_barrier, largest_warm_barrier);
@@ -242,11 +259,7 @@ IpoptSolver::Ending IpoptSolver::run(Start start, const Iterate& from) {
   spare_iterations_ = most_spare_iterations;
   nlp_->set_curvature(start == Start::gauss_newton ? Curvature::gauss_newton : options_.hessian);
   nlp_->set_start(from, barrier);
-  const Ipopt::SmartPtr<Ipopt::TNLP> nlp = Ipopt::GetRawPtr(nlp_);
-  const auto begin = Clock::now();
-  const double ours = nlp_->microseconds();
-  const auto outcome = application_->OptimizeTNLP(nlp);
-  backend_us_ += microseconds_since(begin) - (nlp_->microseconds() - ours);
+  const auto outcome = optimize(Ipopt::GetRawPtr(nlp_));
   if (best_kkt_.largest() <= options_.tolerance) return Ending::converged;
   if (stopped_late_ || outcome == Ipopt::Maximum_CpuTime_Exceeded) return Ending::out_of_time;
   if (iterations_ >= options_.max_iterations) return Ending::out_of_iterations;
@@ -254,6 +267,32 @@ IpoptSolver::Ending IpoptSolver::run(Start start, const Iterate& from) {
       violation_of(seen_kkt_) > clear_violation)
     return Ending::infeasible;
   return best_kkt_.largest() <= near_solution ? Ending::near : Ending::lost;
+}
+
+/// Whether the violation of the constraints has a minimum near the guess that is not zero; `nearest_` is that point, or
+/// the last one. The iterations are not of the problem itself, and not counted.
+bool IpoptSolver::is_infeasible() {
+  nearest_ = guess_;
+  int left = std::min(options_.max_iterations, most_iterations_of_violation);
+  for (int solve = 0; solve < most_solves_of_violation && left > 0; ++solve) {
+    set_run_options(Start::cold, 0.0);
+    set("tol", tolerance_of_violation);
+    set("max_iter", left);
+    set("hessian_approximation", "exact");
+    nlp_->set_curvature(options_.hessian == Curvature::exact ? Curvature::exact : Curvature::gauss_newton);
+    nlp_->set_start(nearest_, 0.0);
+    const Ipopt::SmartPtr<ViolationNlp> violation = new ViolationNlp(*nlp_, *this);
+    const auto outcome = optimize(Ipopt::GetRawPtr(violation));
+    if (!std::isfinite(violation->largest())) return false;
+    nlp_->write(violation->point(), nearest_);
+    if (violation->largest() <= clear_violation) return false;
+    if (violation->slope() <= flat) return true;
+    // What was stopped has not succeeded.
+    if (outcome != Ipopt::Solve_Succeeded && outcome != Ipopt::Solved_To_Acceptable_Level) return false;
+    // What is left of the slope is the pull of the point at which it began: again, from where it has come to.
+    left -= std::max(violation->iterations(), 1);
+  }
+  return false;
 }
 
 /// True if `iterate` was replaced by the best iterate; then `report` has its objective and KKT residual.
@@ -280,22 +319,37 @@ bool IpoptSolver::improve(const Ocp& ocp, Iterate& iterate, Report& report) {
     ending = best_kkt_.largest() <= options_.tolerance ? Ending::converged : Ending::lost;
   } else {
     int polishes = 0;
+    bool is_judged = false;
     Start begun = warm ? Start::warm : Start::cold;
     for (Start start = begun;;) {
-      ending = run(start, start == Start::polish ? best_ : guess_);
-      claimed_infeasible_ |= ending == Ending::infeasible && start != Start::warm;
+      ending = run(start);
       if (ending == Ending::near && polishes++ < most_polishes) {
         start = Start::polish;
         continue;
       }
-      if (ending != Ending::near && ending != Ending::lost && ending != Ending::infeasible) break;
-      report.fallback_used = true;
-      if (begun == Start::adaptive) break;
+      if (ending == Ending::converged || ending == Ending::out_of_time) break;
+      // That Ipopt's restoration ends somewhere is no proof, and neither are iterations that were too few.
+      const bool is_last = ending == Ending::out_of_iterations || begun == Start::adaptive;
+      const bool is_in_doubt = is_last || (ending == Ending::infeasible && start != Start::warm);
+      if (is_in_doubt && !is_judged && violation_of(best_kkt_) > clear_violation) {
+        is_judged = report.fallback_used = true;
+        if (is_infeasible()) {
+          ending = Ending::infeasible;
+        } else if (stopped_late_) {
+          ending = Ending::out_of_time;
+        } else if (ending != Ending::out_of_iterations) {
+          start = Start::nearest;
+          continue;
+        }
+        break;
+      }
+      report.fallback_used |= ending != Ending::out_of_iterations;
+      if (is_last) {
+        if (ending == Ending::infeasible) ending = Ending::lost;
+        break;
+      }
       start = begun = start_after(begun, ending);
     }
-    // A claim stands if no later run has come near to refuting it, also where that run was cut off.
-    const bool is_open = ending != Ending::converged && ending != Ending::out_of_time;
-    if (is_open && claimed_infeasible_ && violation_of(best_kkt_) > clear_violation) ending = Ending::infeasible;
   }
   switch (ending) {
     case Ending::converged:
@@ -327,7 +381,6 @@ Report IpoptSolver::solve(Iterate& iterate, Clock::time_point deadline) noexcept
   if (!ocp_ || !has_sound_numbers(*ocp_, iterate)) return report;
   deadline_ = deadline;
   iterations_ = 0;
-  claimed_infeasible_ = false;
   backend_us_ = 0.0;
   stopped_late_ = false;
   bool is_assessed = false;

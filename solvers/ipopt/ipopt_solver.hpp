@@ -33,6 +33,10 @@ struct IpoptOptions {
 /// guess, in this order: without the guess' multipliers, with the Gauss-Newton instead of the exact Hessian, and with
 /// an adaptive barrier parameter. All runs together take at most max_iterations, and the report flags the fallback.
 ///
+/// Where a run says that constraints cannot be met, or none has met them, the violation alone is minimised from the
+/// guess (ViolationNlp), once, with a budget of its own. The problem is infeasible if that ends where the violation is
+/// stationary and not zero; otherwise the next run begins at the point that was found, if there are iterations left.
+///
 /// Ipopt 3.11 has a global counter and MUMPS keeps global state, so solves are serialised across the process; waiting
 /// counts towards the deadline. Every solve builds Ipopt's algorithm anew, so only the guess carries over from one
 /// solve to the next.
@@ -63,12 +67,15 @@ class IpoptSolver final : public Solver, private Spectator {
     cold,          ///< from the guess alone
     gauss_newton,  ///< the same with the Gauss-Newton Hessian
     adaptive,      ///< the same with the adaptive barrier strategy
+    nearest,       ///< from the point nearest to feasible
     polish         ///< from the best iterate so far, near the solution
   };
   enum class Ending { converged, out_of_time, out_of_iterations, infeasible, near, lost };
 
   bool improve(const Ocp& ocp, Iterate& iterate, Report& report);
-  Ending run(Start start, const Iterate& from);
+  Ipopt::ApplicationReturnStatus optimize(const Ipopt::SmartPtr<Ipopt::TNLP>& nlp);
+  Ending run(Start start);
+  bool is_infeasible();
   Start start_after(Start start, Ending ending) const noexcept;
   int iterations_of(Start start) const noexcept;
   void set_run_options(Start start, double barrier);
@@ -93,11 +100,10 @@ class IpoptSolver final : public Solver, private Spectator {
 
   // Of the current solve.
   Clock::time_point deadline_;
-  Iterate guess_, best_;
+  Iterate guess_, best_, nearest_;
   KktResidual best_kkt_, seen_kkt_;
   double best_objective_ = 0.0, backend_us_ = 0.0;
   bool stopped_late_ = false;
-  bool claimed_infeasible_ = false;  ///< by a run that did not begin at the guess' multipliers
   int iterations_ = 0;
   int spare_iterations_ = 0;  ///< left for the barrier to become negligible once the residual is within the tolerance
 };

@@ -66,6 +66,10 @@ class OcpNlp final : public Ipopt::TNLP {
   /// Sets Ipopt's starting point. If `barrier` is above zero the iterate's multipliers are used too: the distance from
   /// each bound and its multiplier are increased, as little as possible, until their product is at least `barrier`.
   void set_start(const Iterate& iterate, double barrier) noexcept;
+  /// States and controls of a point z, which are all that it writes.
+  void write(const std::vector<double>& z, Iterate& iterate) const noexcept {
+    nlp_.write(*ocp_, z.data(), nullptr, nullptr, iterate);
+  }
   /// Takes effect with the next run.
   void set_curvature(Curvature curvature) noexcept;
   /// The spectator must outlive the solve.

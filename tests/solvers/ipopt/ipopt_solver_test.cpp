@@ -12,11 +12,16 @@
 #include <thread>
 
 #include "problems.hpp"
+#include "solvers/conformance/families.hpp"
+#include "support/limited_ocp.hpp"
 
 namespace rhec::ipopt {
 namespace ipopt_solver_test {
 
 using namespace testing;
+using rhec::testing::Limit;
+using rhec::testing::LimitedOcp;
+using rhec::testing::with_limits;
 
 TEST(Ipopt, AWarmStartTakesFewerIterationsThanAColdOne) {
   int warm_iterations = 0, cold_iterations = 0;
@@ -191,6 +196,53 @@ TEST(Ipopt, AnotherCapacityThanAtSetupIsBadInput) {
   solver->setup(*small);
   Iterate point = RandomProblem::cold_start(*large);
   EXPECT_EQ(solver->solve(point).status, Status::bad_input);
+}
+
+/// On a problem of the conformance suite, with the default options.
+Status verdict_on(const char* family, const char* model, unsigned seed) {
+  const conformance::Problem problem = conformance::family(family).make(conformance::make_model(model), seed);
+  const auto solver = ipopt_with("{}");
+  solver->setup(problem.posed());
+  Iterate point = problem.guess;
+  return solver->solve(point).status;
+}
+
+TEST(Ipopt, RefutesItsOwnClaimThatLimitsCannotBeMet) {
+  EXPECT_EQ(verdict_on("rhe_limits_blocks", "bicycle_slip", 19), Status::solved);
+}
+
+TEST(Ipopt, CallsInfeasibleWhatIterationsAreNotEnoughToRefute) {
+  EXPECT_EQ(verdict_on("rhc_limits_infeasible", "bicycle_slip", 11), Status::infeasible);
+  EXPECT_EQ(verdict_on("rhc_limits_infeasible", "tractor_trailer", 4), Status::infeasible);
+}
+
+TEST(Ipopt, TellsInfeasibleFromTooFewIterations) {
+  RandomProblem random(bicycle(), 11);
+  const auto problem = random.rhc({});
+  const double now = problem->initial_state()[0];
+  const Iterate start = RandomProblem::cold_start(*problem);
+  // Position 0 at node 5 is to be below one value and above another.
+  const auto status = [&](double below, double above, int iterations) {
+    LimitedOcp limited(*problem, 2);
+    limited.add(5, {Limit::Kind::linear, {0}, {1.0}, -infinity, now + below});
+    limited.add(5, {Limit::Kind::linear, {0}, {1.0}, now + above, infinity});
+    const auto solver = ipopt_with("{max_iterations: " + std::to_string(iterations) + "}");
+    solver->setup(limited);
+    const Iterate guess = with_limits(limited, start);
+    Iterate point = guess;
+    const Report report = solver->solve(point);
+    EXPECT_LE(report.iterations, iterations);
+    if (report.status == Status::infeasible) {
+      for (int i = 0; i <= limited.intervals(); ++i)
+        EXPECT_EQ(std::memcmp(point.state(i), guess.state(i), sizeof(double) * limited.state_count(i)), 0);
+    }
+    return report.status;
+  };
+  // With 40 no run of Ipopt itself ends.
+  for (const int iterations : {40, 500}) EXPECT_EQ(status(-1.0, 1.0, iterations), Status::infeasible) << iterations;
+  EXPECT_EQ(status(-1.0, 1.0, 1), Status::iteration_limit);
+  EXPECT_EQ(status(0.1, -0.1, 1), Status::iteration_limit);
+  EXPECT_EQ(status(0.1, -0.1, 500), Status::solved);
 }
 
 }  // namespace ipopt_solver_test
