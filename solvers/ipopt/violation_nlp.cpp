@@ -12,7 +12,7 @@ namespace {
 constexpr double proximity = 1e-5;
 /// How far from a bound an interior point may end that would be at it.
 constexpr double barrier_gap = 1e-5;
-constexpr double no_bound = 1e300;
+constexpr double unbounded = 1e300;
 
 }  // namespace
 
@@ -48,8 +48,8 @@ bool ViolationNlp::get_bounds_info(Ipopt::Index n, double* lower, double* upper,
                                    double* constraint_lower, double* constraint_upper) {
   std::copy(lower_.begin(), lower_.end(), lower);
   std::copy(upper_.begin(), upper_.end(), upper);
-  std::fill(lower + variables_, lower + n, -no_bound);
-  std::fill(upper + variables_, upper + n, no_bound);
+  std::fill(lower + variables_, lower + n, -unbounded);
+  std::fill(upper + variables_, upper + n, unbounded);
   std::fill_n(constraint_lower, m, 0.0);
   std::fill_n(constraint_upper, m, 0.0);
   return true;
