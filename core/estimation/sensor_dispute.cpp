@@ -28,6 +28,15 @@ constexpr int informed = 4;
 // A search that has not explained anything for so long begins anew.
 constexpr int stale = 3;
 
+void make_slip_anew(WalkingFilter& filter, const std::vector<double>& sigmas) noexcept {
+  for (std::size_t j = 0; j < sigmas.size(); ++j) filter.restart_parameter(static_cast<int>(j), sigmas[j]);
+}
+
+void go_on_from(const WalkingFilter& from, WalkingFilter& filter) noexcept {
+  filter.mean() = from.mean();
+  filter.covariance() = from.covariance();
+}
+
 }  // namespace
 
 void SensorWatch::start(Hypothesis& hypothesis) noexcept {
@@ -36,8 +45,7 @@ void SensorWatch::start(Hypothesis& hypothesis) noexcept {
   hypothesis.filter.mean() = memory_->before_mean;
   hypothesis.filter.covariance() = memory_->before_covariance;
   if (&hypothesis == slip_.get()) {
-    for (std::size_t j = 0; j < setup_.parameter_sigmas.size(); ++j)
-      slip_->filter.restart_parameter(static_cast<int>(j), setup_.parameter_sigmas[j]);
+    make_slip_anew(slip_->filter, setup_.parameter_sigmas);
     slip_->filter.predict(input_.data(), memory_->duration);
   } else {
     blind_->filter.predict(believed_input_.data(), memory_->duration);
@@ -53,10 +61,7 @@ void SensorWatch::start_moved() noexcept {
   moved_->explained = 0;
   moved_->evidence = 0.0;
   const ModelDescription& about = filter.model().description();
-  if (!moved_->is_informed) {
-    filter.mean() = own_->filter.mean();
-    filter.covariance() = own_->filter.covariance();
-  }
+  if (!moved_->is_informed) go_on_from(own_->filter, filter);
   const auto is_position = [&](int i) { return i == about.roles.position_x || i == about.roles.position_y; };
   for (std::size_t s = 0; s < sensors_.size(); ++s) {
     if (!(findings_[s] & reason::rejected)) continue;
@@ -94,10 +99,8 @@ void SensorWatch::refute(Hypothesis& hypothesis) noexcept {
 void SensorWatch::begin_edge(bool is_new) noexcept {
   edge_->is_active = is_new && slip_->is_active;
   if (!edge_->is_active) return;
-  edge_->filter.mean() = slip_->filter.mean();
-  edge_->filter.covariance() = slip_->filter.covariance();
-  for (std::size_t j = 0; j < setup_.parameter_sigmas.size(); ++j)
-    edge_->filter.restart_parameter(static_cast<int>(j), setup_.parameter_sigmas[j]);
+  go_on_from(slip_->filter, edge_->filter);
+  make_slip_anew(edge_->filter, setup_.parameter_sigmas);
 }
 
 /// Whether slip that explains the first sample of a dispute, and not the second, has jumped within the interval before
@@ -174,6 +177,41 @@ bool SensorWatch::may_follow() const noexcept {
   return is_position_disputed() || !is_any_undisputed;
 }
 
+/// The log likelihood of slip that has jumped just now; NaN if it has not.
+double SensorWatch::consider_slip() noexcept {
+  const bool is_new = !slip_->is_active;
+  double new_likelihood = Memory::unknown;
+  if (is_new) {
+    start(*slip_);
+    held_count_ = 0;
+    if (disputed_nis(slip_->filter) > left_unexplained * disputed_nis(own_->filter)) {
+      refute(*slip_);
+      return new_likelihood;
+    }
+    if (disputed_samples_ <= fresh) new_likelihood = likelihood(slip_->filter, true);
+  } else if (!fits(slip_->filter, raw_.data()) && goes_on()) {
+    go_on_from(edge_->filter, slip_->filter);
+    slip_->filter.update(raw_.data());
+    edge_->is_active = false;
+    return new_likelihood;
+  }
+  confront(*slip_, raw_.data(), true);
+  begin_edge(is_new);
+  return new_likelihood;
+}
+
+void SensorWatch::consider_moved(double likelihood_of_new_slip) noexcept {
+  const bool is_new = !moved_->is_active;
+  if (is_new) start_moved();
+  // As probable before the sample as that slip has jumped.
+  if (slip_->is_active && !std::isnan(likelihood_of_new_slip))
+    slip_probability_ = 1.0 / (1.0 + std::exp(likelihood(moved_->filter, true) - likelihood_of_new_slip));
+  // Whether the other sensors agree better with a vehicle whose state is what the disputed one says.
+  if (!is_new && !is_position_disputed())
+    moved_->evidence += likelihood(moved_->filter, false) - likelihood(own_->filter, false);
+  confront(*moved_, raw_.data(), true);
+}
+
 SensorWatch::Finding SensorWatch::settle(double time, const double* outputs) noexcept {
   if (!is_disputed_) memory_->was_calm = calm_samples_ >= setup_.calm;
   is_disputed_ = true;
@@ -182,39 +220,12 @@ SensorWatch::Finding SensorWatch::settle(double time, const double* outputs) noe
     for (const int j : sensors_[s].outputs)
       memory_->first_errors[j] =
           (findings_[s] & reason::rejected) && sees_position(j) ? raw_[j] - own_->filter.expected(j) : Memory::unknown;
-  double new_likelihood = Memory::unknown;  // of slip that has jumped just now
-  const auto consider = [&](Hypothesis& hypothesis) {
-    const bool is_new = !hypothesis.is_active;
-    if (is_new && &hypothesis == moved_.get()) start_moved();
-    if (is_new && &hypothesis != moved_.get()) start(hypothesis);
-    if (is_new && &hypothesis == slip_.get()) {
-      held_count_ = 0;
-      if (disputed_nis(hypothesis.filter) > left_unexplained * disputed_nis(own_->filter)) {
-        refute(hypothesis);
-        return;
-      }
-      if (disputed_samples_ <= fresh) new_likelihood = likelihood(hypothesis.filter, true);
-    }
-    // As probable before the sample as that the sensor has moved.
-    if (&hypothesis == moved_.get() && slip_->is_active && !std::isnan(new_likelihood))
-      slip_probability_ = 1.0 / (1.0 + std::exp(likelihood(hypothesis.filter, true) - new_likelihood));
-    // Whether the other sensors agree better with a vehicle whose state is what the disputed one says.
-    if (&hypothesis == moved_.get() && !is_new && !is_position_disputed())
-      hypothesis.evidence += likelihood(hypothesis.filter, false) - likelihood(own_->filter, false);
-    if (&hypothesis == slip_.get() && !is_new && !fits(hypothesis.filter, raw_.data()) && goes_on()) {
-      hypothesis.filter.mean() = edge_->filter.mean();
-      hypothesis.filter.covariance() = edge_->filter.covariance();
-      hypothesis.filter.update(raw_.data());
-      edge_->is_active = false;
-      return;
-    }
-    confront(hypothesis, raw_.data(), true);
-    if (&hypothesis == slip_.get()) begin_edge(is_new);
-  };
-  consider(*slip_);
-  consider(*moved_);
+  consider_moved(consider_slip());
   think_again();
-  if (!is_blind_) consider(*blind_);
+  if (!is_blind_) {
+    if (!blind_->is_active) start(*blind_);
+    confront(*blind_, raw_.data(), true);
+  }
   // Slip that has jumped shows from the first sample on. Later the filter without the sensor knows so little that new
   // slip explains nearly anything.
   const bool has_begun_with_it = disputed_samples_ - slip_->explained < fresh;
@@ -242,8 +253,7 @@ SensorWatch::Finding SensorWatch::settle(double time, const double* outputs) noe
     // Nothing explains what is measured: the position counts, and all else is found anew.
     start_moved();
     moved_->filter.update(raw_.data());
-    for (std::size_t j = 0; j < setup_.parameter_sigmas.size(); ++j)
-      moved_->filter.restart_parameter(static_cast<int>(j), setup_.parameter_sigmas[j]);
+    make_slip_anew(moved_->filter, setup_.parameter_sigmas);
     search_from(moved_->filter, *memory_->search);
     for (Record& record : records_) record = {};
     return accept(*moved_);
@@ -287,8 +297,7 @@ void SensorWatch::acquit(const double* outputs) noexcept {
 }
 
 SensorWatch::Finding SensorWatch::accept(Hypothesis& hypothesis) noexcept {
-  own_->filter.mean() = hypothesis.filter.mean();
-  own_->filter.covariance() = hypothesis.filter.covariance();
+  go_on_from(hypothesis.filter, own_->filter);
   end_dispute();
   return {.release = false, .rebase = true};
 }
@@ -305,16 +314,14 @@ void SensorWatch::think_again() noexcept {
     if (is_found) {
       moved_->is_active = true;
       moved_->explained = search.explained();
-      moved_->filter.mean() = search.best().mean();
-      moved_->filter.covariance() = search.best().covariance();
+      go_on_from(search.best(), moved_->filter);
       return;
     }
   }
   start_moved();
   moved_->filter.update(raw_.data());
   WalkingFilter& trial = *memory_->trial;
-  trial.mean() = moved_->filter.mean();
-  trial.covariance() = moved_->filter.covariance();
+  go_on_from(moved_->filter, trial);
   search_from(trial, search);
   moved_->explained = 1;
   memory_->in_vain = 0;

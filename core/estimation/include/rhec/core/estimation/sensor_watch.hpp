@@ -149,6 +149,8 @@ class RHEC_EXPORT SensorWatch {
   void confront(Hypothesis& hypothesis, const double* outputs, bool counts) noexcept;
   Finding settle(double time, const double* outputs) noexcept;
   Finding accept(Hypothesis& hypothesis) noexcept;
+  double consider_slip() noexcept;
+  void consider_moved(double likelihood_of_new_slip) noexcept;
   void begin_edge(bool is_new) noexcept;
   bool goes_on() noexcept;
   void hold_back(double time, const double* outputs) noexcept;
