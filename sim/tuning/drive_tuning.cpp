@@ -30,12 +30,6 @@ constexpr double same_stamp = 2e-6;
 // the others have said, so that densities multiply.
 constexpr double stagger = 1e-5;
 
-/// Without a map, which is for drives and not for rehearsals of them.
-Settings without_memory(Settings settings) {
-  if (settings.find_path("estimator.memory")) settings.set("estimator.memory", Settings::null());
-  return settings;
-}
-
 /// What is added to each output or input of a drive by the section `signals`, by its path; 0 where that says nothing.
 double offset_at(const Settings& settings, const std::string& key) {
   const Settings* given = settings.find_path(key);
@@ -67,7 +61,7 @@ class TunedDrive final : public TunedLog {
   std::string withheld_unit() const override { return unit_; }
 
   Robot robot(const Settings& settings) const override {
-    return {host_, ReplayOptions::table().parse(without_memory(settings), "scenario"), scenario_estimators()};
+    return {host_, ReplayOptions::table().parse(settings, "scenario"), scenario_estimators()};
   }
 
   std::vector<Tunable> tunables(const Settings& settings, const TuningWishes& wishes) const override {
@@ -189,9 +183,10 @@ class TunedDrive final : public TunedLog {
 
   /// What each sensor says as an event of its own, at the time at which it was measured, all in this order.
   logs::Drive in_time(const logs::Drive& drive, const std::vector<double>& delays) const {
-    logs::Drive result = drive;
-    result.events.clear();
-    result.values.clear();
+    logs::Drive result;
+    result.start = drive.start;
+    result.outputs = drive.outputs;
+    result.inputs = drive.inputs;
     const auto add = [&](const logs::DriveEvent& event, double time, const auto& value_of) {
       result.events.push_back(event);
       result.events.back().time = result.events.back().arrival = time;
@@ -246,26 +241,30 @@ class TunedDrive final : public TunedLog {
   std::map<std::size_t, std::size_t> by_event_;      ///< entries of the sensor that is withheld
 };
 
+/// Settings in which a signal that is only named has a section of its own, so that it takes an offset.
+Settings with_sections_of_signals(const Settings& settings) {
+  Settings result = settings;
+  for (const char* const key : {"signals.outputs", "signals.inputs"}) {
+    const Settings* signals = settings.find_path(key);
+    if (!signals || signals->kind() != Settings::Kind::map) continue;
+    for (const auto& [name, source] : signals->members()) {
+      const bool is_none = source.kind() == Settings::Kind::scalar && source.text() == "none";
+      if (source.kind() == Settings::Kind::map || is_none) continue;
+      Settings section = Settings::map(source.origin());
+      section.add("from", source);
+      result.set(fmt::format("{}.{}", key, name), section);
+    }
+  }
+  return result;
+}
+
 }  // namespace
 
 LogTuning tune_on_drive(const Host& host, const Settings& settings, const logs::Drive& drive,
                         const LogTuningOptions& options, const TuningHooks& hooks) {
-  // A signal that is only named takes an offset, too.
-  Settings named = settings;
-  for (const char* const kind : {"outputs", "inputs"}) {
-    const Settings* section = settings.find_path(std::string("signals.") + kind);
-    if (!section || section->kind() != Settings::Kind::map) continue;
-    for (const auto& [name, entry] : section->members()) {
-      if (entry.kind() == Settings::Kind::map ||
-          (entry.number() == std::nullopt && entry.kind() == Settings::Kind::scalar && entry.text() == "none"))
-        continue;
-      Settings whole = Settings::map(entry.origin());
-      whole.add("from", entry);
-      named.set(fmt::format("signals.{}.{}", kind, name), whole);
-    }
-  }
-  const TunedDrive log(host, drive, named, options.hold_out);
-  return LogTuner(named, log, options, hooks).run();
+  const Settings whole = with_sections_of_signals(settings);
+  const TunedDrive log(host, drive, whole, options.hold_out);
+  return LogTuner(whole, log, options, hooks).run();
 }
 
 }  // namespace rhec::sim
