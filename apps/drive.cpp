@@ -12,6 +12,8 @@
 #include "output.hpp"
 #include "progress.hpp"
 #include "rhec/sim/files/output_folder.hpp"
+#include "rhec/sim/horizons/horizon_log.hpp"
+#include "rhec/sim/logs/smoothing.hpp"
 #include "rhec/sim/maps/map_keeper.hpp"
 #include "rhec/sim/replay/drive_smoothing.hpp"
 #include "rhec/sim/replay/replay_summary.hpp"
@@ -62,23 +64,6 @@ void print_accuracy(const sim::DriveReplay& replay, const Robot& robot, const si
       hold_out.every, accuracy.count, accuracy.sensor, what, accuracy.median, accuracy.rms, accuracy.most, outputs);
 }
 
-/// What is written of all variants; returns the text of summary.json.
-std::string write_files(sim::OutputFolder& folder, const DriveInput& input,
-                        const std::vector<sim::DriveResult>& results, const std::string& log,
-                        const sim::DriveReplay* beside) {
-  const Robot& robot = input.scenario.variants().front().robot;
-  const logs::Drive& drive = input.drives.front();
-  folder.write("estimates.csv", sim::drive_estimates_csv(results, robot));
-  folder.write("innovations.csv", sim::innovations_csv(results, robot));
-  folder.write("predictions.csv", sim::predictions_csv(results, robot));
-  folder.write("times.csv", sim::drive_times_csv(results));
-  std::string summary = sim::drive_summary_json(results, input.scenario.name(), robot, drive, log, input.hold_out);
-  folder.write("summary.json", summary);
-  folder.write("run.svg", sim::drive_svg(results.front(), input.scenario.name(), robot, drive, beside));
-  folder.commit();
-  return summary;
-}
-
 /// What is said at the end: all results as JSON, or where they are.
 void tell_results(const LogArguments& arguments, const std::string& summary, const std::filesystem::path& folder) {
   if (arguments.json)
@@ -95,31 +80,28 @@ TrackArguments only_first(const TrackArguments& tracks, std::size_t variant) {
 }  // namespace
 
 int estimate_drive(const LogArguments& arguments, const TrackArguments& track_arguments) {
-  const DriveInput input(arguments);
+  const sim::ReplayInput input = read_replay_input(arguments);
   tell_notes(input.scenario.variants().front().robot.notes());
   sim::OutputFolder folder(out_of(arguments.out, arguments.scenario, "_estimate"));
   std::vector<sim::DriveResult> results;
+  std::vector<sim::HorizonLog> horizons;
   if (!arguments.json) print_signals(input.drives.front());
   bool all_usable = true;
-  const auto& start = input.scenario.simulated_start();
   for (std::size_t v = 0; v < input.drives.size(); ++v) {
     const sim::ReplayVariant& variant = input.scenario.variants()[v];
-    const logs::Drive& drive = input.drives[v];
     ProgressBar bar(variant.name);
     Tracks tracks(only_first(track_arguments, v), variant.robot);
-    const double passes = input.hold_out.every > 0 ? 2.0 : 1.0;
+    horizons.emplace_back(variant.robot, input.estimates(v), sim::most_windows_of_log / std::ssize(input.drives));
     const auto keeper = std::make_shared<sim::MapKeeper>();
-    sim::DriveResult result;
-    result.all = sim::replay_drive(variant.robot, drive, {}, start,
-                                   {.progress = [&](double share) { bar.show(share / passes); },
-                                    .sampled = [&](const sim::LoopSample& sample) { tracks.take(sample, drive.start); },
-                                    .robot = keeper});
-    result.all.name = variant.name;
-    // Accuracy is that of a replay of its own: the estimates have all measurements.
-    if (input.hold_out.every > 0)
-      result.withheld = sim::replay_drive(variant.robot, drive, input.hold_out, start,
-                                          {.progress = [&](double share) { bar.show(0.5 + 0.5 * share); },
-                                           .robot = std::make_shared<sim::MapKeeper>()});
+    sim::DriveResult result = sim::estimate_variant(input, v,
+                                                    {.progress = [&](double share) { bar.show(share); },
+                                                     .sampled =
+                                                         [&](const sim::LoopSample& sample) {
+                                                           horizons.back().take(sample);
+                                                           tracks.take(sample, input.drives[v].start);
+                                                         },
+                                                     .robot = keeper},
+                                                    std::make_shared<sim::MapKeeper>());
     bar.finish();
     tracks.commit();
     keeper->save();
@@ -131,27 +113,25 @@ int estimate_drive(const LogArguments& arguments, const TrackArguments& track_ar
     all_usable = all_usable && result.all.counts.fallbacks == 0;
     results.push_back(std::move(result));
   }
-  tell_results(arguments, write_files(folder, input, results, arguments.log, nullptr), folder.path());
+  const std::string summary = sim::write_drive_files(folder, input, results);
+  folder.write("horizons.jsonl", sim::horizons_text(horizons, input));
+  folder.commit();
+  tell_results(arguments, summary, folder.path());
   return all_usable ? exit_fine : exit_not_solved;
 }
 
 int smooth_drive(const LogArguments& arguments, const TrackArguments& track_arguments) {
-  const DriveInput input(arguments);
+  const sim::ReplayInput input = read_replay_input(arguments);
   tell_notes(input.scenario.variants().front().robot.notes());
   sim::OutputFolder folder(out_of(arguments.out, arguments.scenario, "_smooth"));
   std::vector<sim::DriveResult> results;
+  std::vector<sim::HorizonLog> none;
   if (!arguments.json) print_signals(input.drives.front());
   bool all_solved = true;
-  const auto& start = input.scenario.simulated_start();
   for (std::size_t v = 0; v < input.drives.size(); ++v) {
     const sim::ReplayVariant& variant = input.scenario.variants()[v];
-    const logs::Drive& drive = input.drives[v];
     ProgressBar bar(variant.name);
-    sim::SmoothedDriveReplay smoothed = sim::smooth_drive(variant.name, variant.robot, drive, {}, start,
-                                                          {.progress = [&](double share) { bar.show(share); }});
-    sim::DriveReplay withheld;
-    if (input.hold_out.every > 0)
-      withheld = sim::smooth_drive(variant.name, variant.robot, drive, input.hold_out, start).smoothed;
+    auto [smoothed, withheld] = sim::smooth_variant(input, v, {.progress = [&](double share) { bar.show(share); }});
     bar.finish();
     if (!arguments.json) {
       print_solve(variant.name, smoothed.report, smoothed.intervals, smoothed.solve_seconds, smoothed.has_sigmas,
@@ -161,13 +141,18 @@ int smooth_drive(const LogArguments& arguments, const TrackArguments& track_argu
     }
     Tracks tracks(only_first(track_arguments, v), variant.robot);
     for (const sim::DriveEstimate& estimate : smoothed.smoothed.estimates)
-      tracks.write(sim::track_sample(estimate, variant.robot, drive.start));
+      tracks.write(sim::track_sample(estimate, variant.robot, input.drives[v].start));
     tracks.commit();
     all_solved = all_solved && smoothed.report.status == Status::solved;
+    // A smoother has no windows, but a report reads the description of the model from their file.
+    for (int i = 0; i < 2; ++i) none.emplace_back(variant.robot, 1);
     results.push_back({std::move(smoothed.smoothed), std::move(withheld)});
     results.push_back({std::move(smoothed.causal), {}});
   }
-  tell_results(arguments, write_files(folder, input, results, arguments.log, &results[1].all), folder.path());
+  const std::string summary = sim::write_drive_files(folder, input, results, &results[1].all);
+  folder.write("horizons.jsonl", sim::horizons_text(none, input, {"", sim::causal_suffix}));
+  folder.commit();
+  tell_results(arguments, summary, folder.path());
   return all_solved ? exit_fine : exit_not_solved;
 }
 

@@ -63,11 +63,11 @@ void tell_damage(const std::optional<logs::Damage>& damage) {
   if (damage) fmt::print(stderr, "rhec: warning: {}\n", damage->what);
 }
 
-DriveInput::DriveInput(const LogArguments& arguments)
-    : scenario(read_replay_scenario(arguments)), hold_out(read_hold_out(arguments)) {
-  const auto log = open_log(arguments.log, arguments.msg_paths);
-  for (const sim::ReplayVariant& variant : scenario.variants()) drives.push_back(read_drive(*log, variant.signals));
-  tell_damage(drives.front().damage);
+sim::ReplayInput read_replay_input(const LogArguments& arguments) {
+  sim::ReplayInput input(read_replay_scenario(arguments), read_hold_out(arguments),
+                         *open_log(arguments.log, arguments.msg_paths));
+  tell_damage(input.drives.front().damage);
+  return input;
 }
 
 bool names_log(const LogArguments& arguments, const char* command) {

@@ -12,7 +12,7 @@
 #include "rhec/logs/mapping/drive.hpp"
 #include "rhec/logs/signals/log.hpp"
 #include "rhec/sim/problems/recording_solver.hpp"
-#include "rhec/sim/replay/replay_scenario.hpp"
+#include "rhec/sim/replay/replay_input.hpp"
 #include "rhec/sim/telemetry/track_writer.hpp"
 
 namespace rhec::apps {
@@ -46,13 +46,9 @@ void add_msg_paths(Command& command, std::vector<std::string>& paths);
 /// Says on standard error where a log is damaged.
 void tell_damage(const std::optional<logs::Damage>& damage);
 
-/// A drive in a log, by the scenario that arguments name, and what is withheld of it. Throws Error for any mistake.
-struct DriveInput {
-  explicit DriveInput(const LogArguments& arguments);
-  sim::ReplayScenario scenario;
-  sim::HoldOut hold_out;
-  std::vector<logs::Drive> drives;  ///< by variant
-};
+/// A drive in a log, by the scenario that arguments name, and what is withheld of it; says where the log is damaged.
+/// Throws Error for any mistake.
+sim::ReplayInput read_replay_input(const LogArguments& arguments);
 
 /// Whether the arguments name a log of either kind; otherwise says so as of a wrong command line.
 bool names_log(const LogArguments& arguments, const char* command);

@@ -22,9 +22,6 @@
 namespace rhec::apps {
 namespace {
 
-// Windows kept for a report, over all variants.
-constexpr std::int64_t most_windows = 1500;
-
 struct EstimateArguments : LogArguments {
   DumpArguments dump;
   TrackArguments tracks;
@@ -88,7 +85,7 @@ int estimate_log(const EstimateArguments& arguments) {
     const std::string run =
         variant.name == scenario.name() ? variant.name : fmt::format("{}/{}", scenario.name(), variant.name);
     const auto nodes = static_cast<std::int64_t>(seconds / variant.robot.step()) + std::ssize(log.fixes);
-    horizons.emplace_back(variant.robot, nodes, most_windows / std::ssize(scenario.variants()));
+    horizons.emplace_back(variant.robot, nodes, sim::most_windows_of_log / std::ssize(scenario.variants()));
     const auto keeper = std::make_shared<sim::MapKeeper>();
     replays.push_back(sim::replay(variant.robot, log, scenario.log(), hold_out,
                                   {.progress = [&](double share) { bar.show(share); },
@@ -140,8 +137,9 @@ void add_estimate(Program& program) {
       "signals are the vehicle's outputs and inputs ('rhec log' proposes one). All measurements are used; a second "
       "replay\n"
       "withholds one in 5 of the position's, and says how well they are predicted. Writes estimates.csv, "
-      "innovations.csv,\n"
-      "predictions.csv, times.csv, summary.json and run.svg to the output folder.\n\n"
+      "measurements.csv,\n"
+      "innovations.csv, predictions.csv, times.csv, summary.json, horizons.jsonl and run.svg to the output folder;\n"
+      "'rhec report' makes a page of them.\n\n"
       "Files of --dead-reckoning and --gps are comma-separated without a header: time, wheel speed, steering angle; "
       "and\n"
       "time, x, y. Writes estimates.csv, times.csv, summary.json, horizons.jsonl and run.svg; 'rhec report' makes a "

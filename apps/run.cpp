@@ -158,10 +158,7 @@ int run(const RunArguments& arguments) {
                              tracks.take(sample, 0);
                            },
                        .robot = keeper};
-  if (measured) {
-    hooks.measured = [&](double arrival, double stamp, const double* y) { measured->take_outputs(arrival, stamp, y); };
-    hooks.moved = [&](double stamp, const double* u) { measured->take_inputs(stamp, u); };
-  }
+  if (measured) measured->listen(hooks);
   const sim::RunLog log = sim::run_closed_loop(scenario, hooks);
   bar.finish();
   const sim::RunSummary summary = sim::summarise(log, scenario);

@@ -8,7 +8,8 @@ function(rhec_add_python_module TARGET)
   target_compile_features(${TARGET} PRIVATE cxx_std_20)
   target_compile_definitions(${TARGET} PRIVATE RHEC_VERSION="${PROJECT_VERSION}")
   target_link_libraries(${TARGET} PRIVATE
-    rhec::core rhec::plugins rhec::sim_check rhec::sim_horizons rhec::sim_maps rhec::sim_study rhec::sim_tuning fmt::fmt)
+    rhec::core rhec::plugins rhec::logs_files rhec::sim_check rhec::sim_horizons rhec::sim_maps rhec::sim_study
+    rhec::sim_telemetry rhec::sim_tuning fmt::fmt)
   set_target_properties(${TARGET} PROPERTIES
     OUTPUT_NAME _rhec CXX_EXTENSIONS OFF
     UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 8)  # pybind11's headers take longer than what is written with them

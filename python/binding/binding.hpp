@@ -37,6 +37,8 @@ void bind_estimators(pybind11::module_& module);
 void bind_controllers(pybind11::module_& module);
 void bind_problems(pybind11::module_& module);
 void bind_studies(pybind11::module_& module);
+void bind_drives(pybind11::module_& module);
+void bind_log_files(pybind11::module_& module);
 void bind_logs(pybind11::module_& module);
 void bind_runs(pybind11::module_& module);
 

@@ -7,9 +7,9 @@
 
 #include "binding.hpp"
 #include "columns.hpp"
+#include "drives.hpp"
 #include "hosts.hpp"
 #include "jobs.hpp"
-#include "rhec/core/base/error.hpp"
 #include "rhec/sim/files/output_folder.hpp"
 #include "rhec/sim/horizons/horizon_log.hpp"
 #include "rhec/sim/logs/recorded_log.hpp"
@@ -147,9 +147,7 @@ void bind_logs(py::module_& module) {
   py::class_<LogFiles>(module, "LogFiles")
       .def(py::init([](const std::string& dead_reckoning, const std::string& gps,
                        const std::vector<std::string>& variants, int hold_out, int phase) {
-             if (hold_out < 0) throw Error("hold_out: expected an integer, at least 0");
-             if (hold_out > 0 && phase >= hold_out) throw Error("phase: expected a number below hold_out");
-             return LogFiles{dead_reckoning, gps, variants, {hold_out, phase >= 0 ? phase : hold_out - 1}};
+             return LogFiles{dead_reckoning, gps, variants, hold_out_of(hold_out, phase)};
            }),
            py::arg("dead_reckoning"), py::arg("gps"), py::arg("variants"), py::arg("hold_out"), py::arg("phase"));
   py::class_<Replays>(module, "Replays")

@@ -129,7 +129,9 @@ PYBIND11_MODULE(_rhec, module) {
   rhec::python::bind_controllers(module);
   rhec::python::bind_problems(module);
   rhec::python::bind_studies(module);
+  rhec::python::bind_log_files(module);
   rhec::python::bind_logs(module);
+  rhec::python::bind_drives(module);
   rhec::python::bind_runs(module);
   refuse_what_was_not_made(module);
   refuse_constructors(module);

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,6 +19,7 @@
 #include "rhec/sim/maps/map_keeper.hpp"
 #include "rhec/sim/problems/problem_file.hpp"
 #include "rhec/sim/problems/problem_record.hpp"
+#include "rhec/sim/telemetry/measurement_log.hpp"
 
 namespace rhec::python {
 namespace {
@@ -125,7 +127,7 @@ class ProblemKeeper {
 };
 
 std::unique_ptr<Drive> run_drive(const std::vector<std::string>& plugin_path, const Settings& settings,
-                                 int problems_every, const py::object& progress) {
+                                 int problems_every, const std::string& log, const py::object& progress) {
   auto drive = std::make_unique<Drive>();
   do_watched(progress, [&](Job& job) {
     drive->scenario = std::make_shared<const sim::Scenario>(examined_host(plugin_path), settings);
@@ -135,11 +137,15 @@ std::unique_ptr<Drive> run_drive(const std::vector<std::string>& plugin_path, co
     sim::HorizonLog horizons(scenario.robot(), static_cast<std::int64_t>(samples) + 1);
     const auto keeper = std::make_shared<sim::MapKeeper>();
     ProblemKeeper problems(scenario, problems_every);
-    drive->log =
-        sim::run_closed_loop(scenario, {.progress = [&](double share) { job.show(share); },
-                                        .solved = problems.hook(),
-                                        .sampled = [&](const sim::LoopSample& sample) { horizons.take(sample); },
-                                        .robot = keeper});
+    std::optional<sim::MeasurementLog> measured;
+    if (!log.empty()) measured.emplace(log, scenario.robot().model()->description());
+    sim::LoopHooks hooks{.progress = [&](double share) { job.show(share); },
+                         .solved = problems.hook(),
+                         .sampled = [&](const sim::LoopSample& sample) { horizons.take(sample); },
+                         .robot = keeper};
+    if (measured) measured->listen(hooks);
+    drive->log = sim::run_closed_loop(scenario, hooks);
+    if (measured) measured->close();
     drive->problems = problems.lines();
     drive->summary = sim::summary_json(sim::summarise(drive->log, scenario));
     drive->horizons = sim::horizons_text(horizons, drive->log, scenario);
@@ -184,7 +190,7 @@ void bind_runs(py::module_& module) {
       .def("causal_steps", &causal_steps)
       .def("svg", &svg_of)
       .def("save", &save_drive, py::arg("folder"));
-  module.def("run", &run_drive, py::arg("plugin_path"), py::arg("settings"), py::arg("problems_every"),
+  module.def("run", &run_drive, py::arg("plugin_path"), py::arg("settings"), py::arg("problems_every"), py::arg("log"),
              py::arg("progress"));
   module.def("smooth_drive", &smooth_drive, py::arg("plugin_path"), py::arg("settings"), py::arg("progress"));
 }

@@ -11,13 +11,17 @@
 
 #include "binding.hpp"
 #include "columns.hpp"
+#include "drives.hpp"
 #include "hosts.hpp"
 #include "jobs.hpp"
 #include "rhec/core/base/error.hpp"
+#include "rhec/logs/files/open_log.hpp"
+#include "rhec/sim/replay/replay_scenario.hpp"
 #include "rhec/sim/store/sweep_store.hpp"
 #include "rhec/sim/study/sweep.hpp"
 #include "rhec/sim/study/sweep_runner.hpp"
 #include "rhec/sim/tuning/controller_tuning.hpp"
+#include "rhec/sim/tuning/drive_tuning.hpp"
 #include "rhec/sim/tuning/log_tuning.hpp"
 
 namespace rhec::python {
@@ -109,24 +113,18 @@ py::dict compared(const std::vector<sim::Compared>& figures) {
   return columns.take();
 }
 
-py::dict tune_log(const std::vector<std::string>& plugin_path, const Settings& settings,
-                  const std::string& dead_reckoning, const std::string& gps, const py::dict& wishes,
-                  const py::object& progress) {
+/// What is wished of the tuning of a log.
+sim::LogTuningOptions log_options_of(const py::dict& wishes) {
   sim::LogTuningOptions options;
-  const int every = wishes["hold_out"].cast<int>();
-  options.hold_out = {every, every - 1};
+  options.hold_out = hold_out_of(wishes["hold_out"].cast<int>(), -1);
   options.wishes = {wishes["tune"].cast<std::vector<std::string>>(), wishes["keep"].cast<std::vector<std::string>>()};
   options.threads = threads_of(wishes["threads"].cast<int>());
   options.smooths = wishes["smoother"].cast<bool>();
   options.most_seconds = wishes["most_seconds"].cast<double>();
-  const auto variants = wishes["variants"].cast<std::vector<std::string>>();
-  sim::LogTuning tuning;
-  do_watched(progress, [&](Job& job) {
-    const Host host = examined_host(plugin_path);
-    const sim::LogScenario scenario(host, settings, variants);
-    tuning = sim::tune_on_log(host, scenario.variants().front().settings, sim::read_log_tables(dead_reckoning, gps),
-                              options, hooks_of(job, options.most_seconds));
-  });
+  return options;
+}
+
+py::dict dict_of(const sim::LogTuning& tuning) {
   Columns numbers(tuning.numbers);
   using sim::TunedNumber;
   numbers.objects("name", [](const TunedNumber& n) { return n.tunable.name; });
@@ -144,6 +142,39 @@ py::dict tune_log(const std::vector<std::string>& plugin_path, const Settings& s
   made["svg"] = sim::tuning_svg(tuning);
   made["remarks"] = tuning.remarks;
   return made;
+}
+
+/// On dead reckoning and fixes.
+py::dict tune_log(const std::vector<std::string>& plugin_path, const Settings& settings,
+                  const std::string& dead_reckoning, const std::string& gps, const py::dict& wishes,
+                  const py::object& progress) {
+  const sim::LogTuningOptions options = log_options_of(wishes);
+  const auto variants = wishes["variants"].cast<std::vector<std::string>>();
+  sim::LogTuning tuning;
+  do_watched(progress, [&](Job& job) {
+    const Host host = examined_host(plugin_path);
+    const sim::LogScenario scenario(host, settings, variants);
+    tuning = sim::tune_on_log(host, scenario.variants().front().settings, sim::read_log_tables(dead_reckoning, gps),
+                              options, hooks_of(job, options.most_seconds));
+  });
+  return dict_of(tuning);
+}
+
+/// On a log with the vehicle's own sensors.
+py::dict tune_drive(const std::vector<std::string>& plugin_path, const Settings& settings, const DriveLog& log,
+                    const py::dict& wishes, const py::object& progress) {
+  const sim::LogTuningOptions options = log_options_of(wishes);
+  sim::LogTuning tuning;
+  do_watched(progress, [&](Job& job) {
+    const Host host = examined_host(plugin_path);
+    const sim::ReplayScenario scenario(host, settings, log.variants);
+    const sim::ReplayVariant& variant = scenario.variants().front();
+    const auto file = logs::open_log(log.file, {.msg_paths = {log.msg_paths.begin(), log.msg_paths.end()}});
+    const logs::Drive drive = logs::read_drive(*file, variant.signals);
+    if (drive.damage) job.tell({drive.damage->what});
+    tuning = sim::tune_on_drive(host, variant.settings, drive, options, hooks_of(job, options.most_seconds));
+  });
+  return dict_of(tuning);
 }
 
 py::dict tune_controller(const std::vector<std::string>& plugin_path, const Settings& settings,
@@ -193,6 +224,8 @@ void bind_studies(py::module_& module) {
              py::arg("threads"), py::arg("progress"));
   module.def("tune_log", &tune_log, py::arg("plugin_path"), py::arg("settings"), py::arg("dead_reckoning"),
              py::arg("gps"), py::arg("wishes"), py::arg("progress"));
+  module.def("tune_drive", &tune_drive, py::arg("plugin_path"), py::arg("settings"), py::arg("log"), py::arg("wishes"),
+             py::arg("progress"));
   module.def("tune_controller", &tune_controller, py::arg("plugin_path"), py::arg("settings"), py::arg("cases"),
              py::arg("wishes"), py::arg("progress"));
 }

@@ -79,6 +79,19 @@ def is_array(value: Any) -> bool:
     return value is not None and made.dtype.kind in "biuf"
 
 
+def is_table(value: Any) -> bool:
+    """Whether it has columns by name: a dict, a rhec.Table, a pandas.DataFrame."""
+    return isinstance(value, Mapping) or hasattr(value, "columns") and hasattr(value, "keys") and hasattr(value, "__getitem__")
+
+
+def is_log(value: Any) -> bool:
+    """Whether it may be a recorded drive."""
+    import rhec
+
+    several = _is_sequence(value) and len(value) > 0 and all(map(is_table, value))
+    return isinstance(value, rhec.Log) or _is_file(value) or is_table(value) or several or is_array(value)
+
+
 def _is_dict(value: Any) -> bool:
     return isinstance(value, Mapping) and all(map(_is_text, value))
 
@@ -111,6 +124,7 @@ _KINDS = {
     "Changes": _Kind("a dict of keys, such as {'estimator.horizon': 20}, or None", lambda value: value is None or _is_dict(value)),
     "PluginPath": _Kind("a folder or a list of folders", lambda value: _is_file(value) or isinstance(value, Sequence) and all(map(_is_file, value))),
     "LogPart": _Kind("the name of a file, or an array (n, 3)", lambda value: _is_file(value) or is_array(value)),
+    "DriveLog": _Kind("the name of a file, a Log, a table by columns, a list of tables, or beside gps an array (n, 3)", is_log),
     "Progress": _Kind("True, False, None or a function of (share, text)", lambda value: value is None or _is_flag(value) or callable(value)),
     "Array": _ARRAY,
     "ArrayLike": _ARRAY,
@@ -131,7 +145,7 @@ _KINDS = {
 # Who makes what is made in C++.
 _MAKERS = {"Estimate": "Estimator.estimate", "Command": "Controller.control", "Estimator": "Robot.make_estimator",
            "Controller": "Robot.make_controller", "Path": "rhec.Path", "Vehicle": "Robot.vehicle or Model.load",
-           "Drive": "rhec.run", "Replays": "rhec.estimate", "ProblemBase": "rhec.read_problems", "Settings": "a configuration",
+           "Drive": "rhec.run", "Replays": "rhec.estimate", "DriveReplays": "rhec.estimate", "DriveLog": "rhec.estimate", "LogFile": "rhec.Log", "ProblemBase": "rhec.read_problems", "Settings": "a configuration",
            "Solution": "Problem.solve", "Report": "a solve", "Variable": "a Vehicle", "LogFiles": "rhec.estimate"}
 _SPLIT = re.compile(r"\s*\|\s*(?![^\[]*\])")
 

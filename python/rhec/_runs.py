@@ -1,23 +1,23 @@
 """Drives that are simulated or recorded, and what was estimated of them."""
 from __future__ import annotations
 
-import contextlib
 import html
 import json
 import math
 import os
 import pathlib
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from . import _configuration, _rhec
 from ._arguments import check_range, checked
 from ._errors import Error, Names
+from ._logs import drive_file, log_files
 from ._problems import Problem, problems_of
 from ._progress import Bar
 from ._table import Table
-from ._types import Changes, Configuration, File, LogPart, PluginPath, Progress
+from ._types import Changes, Configuration, DriveLog, File, LogPart, PluginPath, Progress
 
 
 @checked
@@ -116,12 +116,13 @@ class SmoothedRun(_Result):
 class Estimates(_Result):
     """What a recorded drive was estimated to be.
 
-    variants: by the variant's name a Table with a row for each node and fix: time [s], estimates (NAME), standard
-        deviations (sigma_NAME), fixes and their residuals [m]
+    variants: by the variant's name a Table of time [s], estimates (NAME) and standard deviations (sigma_NAME). Of dead reckoning
+        and fixes it has a row for each node and fix, with fixes and their residuals [m]; of other logs one for each step,
+        with health and its findings
     reports: of a smoother, by variant, in order
     """
 
-    def __init__(self, made: _rhec.Replays) -> None:
+    def __init__(self, made: _rhec.Replays | _rhec.DriveReplays) -> None:
         super().__init__(made)
         self.variants = {name: Table(made.estimates(index)) for index, name in enumerate(made.names)}
         self.reports = made.reports
@@ -136,13 +137,38 @@ class Estimates(_Result):
 
 
 @checked
+class DriveEstimates(Estimates):
+    """What a log with the vehicle's own sensors was estimated to be.
+
+    innovations: by the variant's name a Table with a row for each measurement: time [s], sensor, accepted, nis, and by output
+        what was measured minus what was expected (NAME), and the standard deviation expected of that (sigma_NAME)
+    predictions: by the variant's name a Table with a row for each measurement that was withheld: time [s], distance, and by
+        output what was measured minus what was predicted (residual_NAME)
+    """
+
+    def __init__(self, made: _rhec.DriveReplays) -> None:
+        super().__init__(made)
+        self.innovations = {name: Table(made.innovations(index)) for index, name in enumerate(made.names)}
+        self.predictions = {name: Table(made.predictions(index)) for index, name in enumerate(made.names)}
+
+    def save_track(self, file: File) -> pathlib.Path:
+        """Writes the estimates of the first variant for other tools, by the ending of the file's name: .mcap (messages of ROS 2,
+        for Foxglove and PlotJuggler), .csv (PlotJuggler), .tum (evo)."""
+        if isinstance(self._made, _Kept):
+            raise Error("save_track: these results came from another process; write the track there")
+        self._made.save_track(os.fspath(file))
+        return pathlib.Path(file)
+
+
+@checked
 def run(scenario: Configuration, *, set: Changes = None, plugin_path: PluginPath = (), problems_every: int = 0,
-        progress: Progress = None) -> Run:
+        log: File | None = None, progress: Progress = None) -> Run:
     """Runs a scenario: a robot on simulated ground learns its slip and holds its path. Returns a Run.
 
     scenario: a YAML file, or the same as a dict
     set: keys to change, such as {"speed": 4, "estimator.name": "ekf"}
     problems_every: keep the problems of every N-th step, for `Run.problems`; 0: none
+    log: keep what the sensors measured, in a file that `estimate` takes, .csv or .mcap
     progress: None for a bar on a terminal or in a notebook; True, False, or a function of (share, text)
 
     Ctrl-C ends it with KeyboardInterrupt, and nothing is written.
@@ -150,72 +176,66 @@ def run(scenario: Configuration, *, set: Changes = None, plugin_path: PluginPath
     check_range("run", problems_every=(problems_every, 0, math.inf))
     settings, folders = _configuration.read(scenario, set, plugin_path)
     with Bar(progress, "run") as bar:
-        return Run(_rhec.run(folders, settings, problems_every, bar), folders)
+        return Run(_rhec.run(folders, settings, problems_every, os.fspath(log) if log else "", bar), folders)
 
 
-@contextlib.contextmanager
-def _log_file(given: LogPart, name: str, columns: str) -> Iterator[str]:
-    """The file of a log; an array becomes one."""
-    if isinstance(given, (str, os.PathLike)):
-        yield os.fspath(given)
-        return
-    import numpy
-
-    rows = numpy.asarray(given, dtype=float)
-    if rows.ndim != 2 or rows.shape[1] != 3:
-        raise Error(f"{name}: expected a file or an array (n, 3) of {columns}")
-    with tempfile.TemporaryDirectory(prefix="rhec-") as folder:
-        file = os.path.join(folder, f"{name}.csv")
-        numpy.savetxt(file, rows, fmt="%.17g", delimiter=",")
-        yield file
+# Without `hold_out`: one in so many measurements of a log is withheld, and of dead reckoning and fixes none.
+_USUAL_HOLD_OUT = 5
 
 
-@contextlib.contextmanager
-def log_files(dead_reckoning: LogPart, gps: LogPart) -> Iterator[tuple[str, str]]:
-    """The names of both files of a log, for as long as the context lasts."""
-    with _log_file(dead_reckoning, "dead_reckoning", "time [s], wheel speed [m/s] and steering angle [rad]") as rows:
-        with _log_file(gps, "gps", "time [s], x [m] and y [m]") as fixes:
-            yield rows, fixes
-
-
-def _log(function, scenario, log, variants, hold_out, phase, changes, plugin_path, progress, title):
+def _tables(function, scenario, log, variants, hold_out, phase, changes, plugin_path, progress, title):
     settings, folders = _configuration.read(scenario, changes, plugin_path)
     with log_files(*log) as names, Bar(progress, title) as bar:
-        files = _rhec.LogFiles(*names, list(variants), hold_out, -1 if phase is None else phase)
+        files = _rhec.LogFiles(*names, list(variants), hold_out or 0, -1 if phase is None else phase)
         return Estimates(function(folders, settings, files, bar))
 
 
+def _drive(function, scenario, log, variants, hold_out, phase, changes, plugin_path, progress, title):
+    settings, folders = _configuration.read(scenario, changes, plugin_path)
+    with drive_file(log) as (file, name, msg_paths), Bar(progress, title) as bar:
+        every = _USUAL_HOLD_OUT if hold_out is None else hold_out
+        asked = _rhec.DriveLog(file, name, msg_paths, list(variants), every, -1 if phase is None else phase)
+        return DriveEstimates(function(folders, settings, asked, bar))
+
+
 @checked
-def estimate(scenario: Configuration, dead_reckoning: LogPart, gps: LogPart, *, variants: Sequence[str] = (), hold_out: int = 0,
-             phase: int | None = None, set: Changes = None, plugin_path: PluginPath = (),
+def estimate(scenario: Configuration, log: DriveLog, gps: LogPart | None = None, *, variants: Sequence[str] = (),
+             hold_out: int | None = None, phase: int | None = None, set: Changes = None, plugin_path: PluginPath = (),
              progress: Progress = None) -> Estimates:
-    """Estimates state and slip from a recorded drive, and predicts what it withholds. Returns Estimates.
+    """Estimates state and slip from a recorded drive, and predicts what it withholds. Returns DriveEstimates; of dead reckoning
+    and fixes Estimates.
 
-    dead_reckoning: time [s], wheel speed [m/s], steering angle [rad]: a file, or an array (n, 3), NaN where missing
-    gps: time [s], x [m], y [m]: likewise
+    log: what the vehicle's sensors said: the name of a file (CSV, MCAP, a bag of rosbag2) or a Log; or a table: a dict of columns,
+        a Table, a pandas.DataFrame, with a column time [s]; or a list of tables, each with a time of its own. The scenario's
+        section `signals` says which are the model's outputs and inputs. NaN is missing
+    gps: time [s], x [m], y [m]: a file, or an array (n, 3); `log` is dead reckoning then: time [s], wheel speed [m/s],
+        steering angle [rad], likewise
     variants: names of the scenario's variants to run; all without any
-    hold_out: withhold one of so many fixes, from `phase` on; 0: none
+    hold_out: withhold one of so many measurements of the position, from `phase` on; 0: none. None: 5 of a log, and none of
+        fixes
     """
-    return _log(_rhec.estimate_log, scenario, (dead_reckoning, gps), variants, hold_out, phase, set, plugin_path, progress,
-                "estimate")
+    if gps is not None:
+        return _tables(_rhec.estimate_log, scenario, (log, gps), variants, hold_out, phase, set, plugin_path, progress, "estimate")
+    return _drive(_rhec.estimate_drive, scenario, log, variants, hold_out, phase, set, plugin_path, progress, "estimate")
 
 
 @checked
-def smooth(scenario: Configuration, dead_reckoning: LogPart | None = None, gps: LogPart | None = None, *,
-           variants: Sequence[str] = (), hold_out: int = 0, phase: int | None = None, set: Changes = None,
-           plugin_path: PluginPath = (), progress: Progress = None) -> Estimates | SmoothedRun:
+def smooth(scenario: Configuration, log: DriveLog | None = None, gps: LogPart | None = None, *, variants: Sequence[str] = (),
+           hold_out: int | None = None, phase: int | None = None, set: Changes = None, plugin_path: PluginPath = (),
+           progress: Progress = None) -> Estimates | SmoothedRun:
     """Estimates a whole drive at once: every moment from what was measured before and after it.
 
-    With the two parts of a recorded drive, as `estimate` has them, it returns Estimates, causal ones beside; without
-    them it simulates the scenario's drive first and returns a SmoothedRun.
+    With a recorded drive, as `estimate` has it, it returns DriveEstimates or Estimates, causal ones beside; without one it
+    simulates the scenario's drive first and returns a SmoothedRun.
     """
-    if (dead_reckoning is None) != (gps is None):
-        raise Error("smooth: expected both dead_reckoning and gps, or neither")
+    if gps is not None and log is None:
+        raise Error("smooth: found gps alone, expected dead reckoning, too, as log")
     if gps is not None:
-        return _log(_rhec.smooth_log, scenario, (dead_reckoning, gps), variants, hold_out, phase, set, plugin_path, progress,
-                    "smooth")
+        return _tables(_rhec.smooth_log, scenario, (log, gps), variants, hold_out, phase, set, plugin_path, progress, "smooth")
+    if log is not None:
+        return _drive(_rhec.smooth_drive_log, scenario, log, variants, hold_out, phase, set, plugin_path, progress, "smooth")
     if variants or hold_out or phase is not None:
-        raise Error("smooth: variants, hold_out and phase are those of a recorded drive; give dead_reckoning and gps, too")
+        raise Error("smooth: variants, hold_out and phase are those of a recorded drive; give a log, too")
     settings, folders = _configuration.read(scenario, set, plugin_path)
     with Bar(progress, "smooth") as bar:
         return SmoothedRun(_rhec.smooth_drive(folders, settings, bar))

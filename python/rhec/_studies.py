@@ -11,10 +11,10 @@ from typing import Any
 from . import _configuration, _files, _rhec
 from ._arguments import check_range, checked
 from ._errors import Error, Names
+from ._logs import drive_file, log_files
 from ._progress import Bar
-from ._runs import log_files
 from ._table import Table
-from ._types import Changes, Configuration, File, LogPart, PluginPath, Progress
+from ._types import Changes, Configuration, DriveLog, File, LogPart, PluginPath, Progress
 
 
 @checked
@@ -152,15 +152,15 @@ class Tuning:
 
 
 @checked
-def tune(scenario: Configuration, dead_reckoning: LogPart, gps: LogPart, *, hold_out: int = 5, tune: Sequence[str] = (),
+def tune(scenario: Configuration, log: DriveLog, gps: LogPart | None = None, *, hold_out: int = 5, tune: Sequence[str] = (),
          keep: Sequence[str] = (), variants: Sequence[str] = (), threads: int = 0, smoother: bool = True,
          most_seconds: float = math.inf, set: Changes = None, plugin_path: PluginPath = (),
          progress: Progress = None) -> Tuning:
     """Finds the noise of sensors, priors, biases, lever arms and delays that make a recorded drive most likely. Returns
     a Tuning.
 
-    dead_reckoning, gps: as `estimate` has them
-    hold_out: one of so many fixes is not tuned on, and judges the result
+    log, gps: as `estimate` has them
+    hold_out: one of so many measurements of the position is not tuned on, and judges the result
     tune, keep: keys of the scenario to tune beside, or not to tune (docs/tune.md)
     smoother: whether the smoother judges, too, which takes longest
     most_seconds: of the search; then the best so far is taken
@@ -171,8 +171,12 @@ def tune(scenario: Configuration, dead_reckoning: LogPart, gps: LogPart, *, hold
     settings, folders = _configuration.read(scenario, set, plugin_path)
     wishes = {"hold_out": hold_out, "tune": list(tune), "keep": list(keep), "variants": list(variants), "threads": threads,
               "smoother": smoother, "most_seconds": most_seconds}
-    with log_files(dead_reckoning, gps) as names, Bar(progress, "tune") as bar:
-        return Tuning(_rhec.tune_log(folders, settings, names[0], names[1], wishes, bar))
+    if gps is not None:
+        with log_files(log, gps) as names, Bar(progress, "tune") as bar:
+            return Tuning(_rhec.tune_log(folders, settings, names[0], names[1], wishes, bar))
+    with drive_file(log) as (file, name, msg_paths), Bar(progress, "tune") as bar:
+        asked = _rhec.DriveLog(file, name, msg_paths, list(variants), hold_out, -1)
+        return Tuning(_rhec.tune_drive(folders, settings, asked, wishes, bar))
 
 
 @checked

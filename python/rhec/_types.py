@@ -18,6 +18,8 @@ Changes = Union[Mapping[str, Any], None]
 PluginPath = Union[str, "os.PathLike[str]", Sequence[Union[str, "os.PathLike[str]"]]]
 # A file, or an array (n, 3).
 LogPart = Union[str, "os.PathLike[str]", ArrayLike]
+# A file or a Log; a table by columns, several of them; or, beside fixes, an array (n, 3).
+DriveLog = Any
 # By names or symbols a dict, a list, a matrix, or a vector of symbols.
 Terms = Any
 # None for a bar where one can be seen, True, False, or a function of (share, text).

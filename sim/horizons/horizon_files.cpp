@@ -218,28 +218,46 @@ std::string horizons_text(const HorizonLog& horizons, const RunLog& log, const S
   return text + horizons.nodes_line(0) + horizons.records();
 }
 
-std::string horizons_text(const std::vector<HorizonLog>& horizons, const RecordedLog& log, const LogScenario& scenario,
-                          const HoldOut& hold_out, const std::vector<std::string>& suffixes) {
-  const Robot& first = scenario.variants().front().robot;
+namespace {
+
+/// Of a recorded drive. A variant has a name and a robot.
+template <class Variants>
+std::string log_horizons_text(const std::vector<HorizonLog>& horizons, Json head, const std::string& name,
+                              const Variants& variants, const HoldOut& hold_out,
+                              const std::vector<std::string>& suffixes) {
   Json json;
   json["form"] = "rhec horizons";
   json["version"] = version;
   json["kind"] = "log";
-  json["name"] = scenario.name();
-  json["fixes"] = log.fixes.size();
+  json["name"] = name;
+  json.update(head);
   json["hold_out"] = {{"every", hold_out.every}, {"phase", hold_out.phase}};
   json["variants"] = Json::array();
-  for (const LogVariant& variant : scenario.variants())
+  for (const auto& variant : variants)
     for (const std::string& suffix : suffixes) {
       Json about = {{"name", variant.name + suffix}};
       about["settings"] = settings_of(variant.robot, false);
       json["variants"].push_back(std::move(about));
     }
-  json["model"] = json_of(first);
+  json["model"] = json_of(variants.front().robot);
   std::string text = json.dump() + "\n";
   for (std::size_t i = 0; i < horizons.size(); ++i)
     text += horizons[i].nodes_line(static_cast<int>(i)) + horizons[i].records();
   return text;
+}
+
+}  // namespace
+
+std::string horizons_text(const std::vector<HorizonLog>& horizons, const RecordedLog& log, const LogScenario& scenario,
+                          const HoldOut& hold_out, const std::vector<std::string>& suffixes) {
+  return log_horizons_text(horizons, {{"fixes", log.fixes.size()}}, scenario.name(), scenario.variants(), hold_out,
+                           suffixes);
+}
+
+std::string horizons_text(const std::vector<HorizonLog>& horizons, const ReplayInput& input,
+                          const std::vector<std::string>& suffixes) {
+  return log_horizons_text(horizons, Json::object(), input.scenario.name(), input.scenario.variants(), input.hold_out,
+                           suffixes);
 }
 
 }  // namespace rhec::sim

@@ -116,6 +116,22 @@ std::string drive_estimates_csv(const std::vector<DriveResult>& results, const R
   return text;
 }
 
+std::string measurements_csv(const DriveResult& result, const Robot& robot, const logs::Drive& drive) {
+  std::string text = "time,received";
+  append_header("", robot.model()->description().outputs, text);
+  text += ",held_out\n";
+  std::vector<bool> is_held_out(drive.events.size());
+  for (const DrivePrediction& prediction : result.withheld.predictions) is_held_out[prediction.event] = true;
+  for (std::size_t i = 0; i < drive.events.size(); ++i) {
+    const logs::DriveEvent& event = drive.events[i];
+    if (!event.is_output) continue;
+    fmt::format_to(std::back_inserter(text), "{:.10g},{:.10g}", event.time, event.arrival);
+    for (int j = 0; j < drive.outputs; ++j) append(drive.values_of(event)[j], text);
+    fmt::format_to(std::back_inserter(text), ",{:d}\n", bool{is_held_out[i]});
+  }
+  return text;
+}
+
 std::string innovations_csv(const std::vector<DriveResult>& results, const Robot& robot) {
   const std::vector<Variable>& outputs = robot.model()->description().outputs;
   std::string text = "variant,time,sensor,accepted,nis";
@@ -128,14 +144,8 @@ std::string innovations_csv(const std::vector<DriveResult>& results, const Robot
       fmt::format_to(std::back_inserter(text), "{},{:.10g},{},{:d}", result.all.name, innovation.time, sensor.name,
                      innovation.accepted);
       append(innovation.nis, text);
-      // Which values are missing is not known where there are fewer.
-      const bool is_whole = innovation.values.size() == sensor.outputs.size();
-      for (const auto* values : {&innovation.values, &innovation.sigmas})
-        for (std::size_t j = 0; j < outputs.size(); ++j) {
-          const auto at = std::ranges::find(sensor.outputs, static_cast<int>(j));
-          const bool is_there = is_whole && at != sensor.outputs.end();
-          append(is_there ? (*values)[static_cast<std::size_t>(at - sensor.outputs.begin())] : std::nan(""), text);
-        }
+      for (const auto* entries : {&innovation.values, &innovation.sigmas})
+        for (int j = 0; j < std::ssize(outputs); ++j) append(of_output(*entries, innovation, result.all, j), text);
       text += '\n';
     }
   return text;

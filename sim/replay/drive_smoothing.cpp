@@ -45,6 +45,8 @@ SmoothedDriveReplay smooth_drive(const std::string& name, const Robot& robot, co
   result.smoothed.name = name;
   result.smoothed.seconds = Seconds(Clock::now() - begin).count();
   result.smoothed.solve_us = {1e6 * run.solve_seconds};
+  result.smoothed.counts.estimates = 1;
+  result.smoothed.counts.fallbacks = is_usable(run.report.status) ? 0 : 1;
   std::vector<double> state(static_cast<std::size_t>(nx)), parameters(static_cast<std::size_t>(np));
   for (DriveEstimate& entry : result.smoothed.estimates) {
     const double time = entry.time - first_time;

@@ -43,6 +43,14 @@ double median_of(std::vector<double> values) {
 
 }  // namespace
 
+double of_output(const std::vector<double>& entries, const DriveInnovation& innovation, const DriveReplay& replay,
+                 int output) noexcept {
+  const std::vector<int>& outputs = replay.sensors[static_cast<std::size_t>(innovation.sensor)].outputs;
+  const auto at = std::ranges::find(outputs, output);
+  if (at == outputs.end() || entries.size() != outputs.size()) return unknown;
+  return entries[static_cast<std::size_t>(at - outputs.begin())];
+}
+
 std::vector<SensorSummary> summarise_innovations(const DriveReplay& replay, const Robot& robot) {
   const std::vector<Variable>& outputs = robot.model()->description().outputs;
   std::vector<SensorSummary> summaries;

@@ -49,7 +49,10 @@ Json folder_report(const fs::path& folder) {
   const Json summary = read_json(folder / "summary.json", run_maker);
   if (summary.is_object() && summary.contains("variants")) {
     if (!has("estimates.csv")) missing(folder, "estimates.csv", "summary.json", log_maker);
-    return log_report(folder, summary);
+    if (!summary.contains("signals")) return log_report(folder, summary);
+    for (const char* name : {"innovations.csv", "measurements.csv", "predictions.csv"})
+      if (!has(name)) missing(folder, name, "summary.json", log_maker);
+    return drive_report(folder, summary);
   }
   if (!summary.is_object() || !summary.contains("mae"))
     throw Error(fmt::format("{}: has neither mae nor variants, so it is no summary that rhec wrote; {}",

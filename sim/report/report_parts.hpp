@@ -12,6 +12,7 @@ namespace rhec::sim {
 // The parts of report_document, one for each kind of source.
 Json run_report(const std::filesystem::path& folder, const Json& summary);
 Json log_report(const std::filesystem::path& folder, const Json& summary);
+Json drive_report(const std::filesystem::path& folder, const Json& summary);
 Json sweep_report(const std::filesystem::path& file);
 Json comparison_report(const std::filesystem::path& file);
 Json faults_report(const std::filesystem::path& file);

@@ -110,6 +110,12 @@ void MeasurementLog::take_outputs(double arrival, double stamp, const double* ou
   form_->take(arrival, stamp, true, outputs);
 }
 void MeasurementLog::take_inputs(double stamp, const double* inputs) { form_->take(stamp, stamp, false, inputs); }
+void MeasurementLog::listen(LoopHooks& hooks) {
+  hooks.measured = [this](double arrival, double stamp, const double* outputs) {
+    take_outputs(arrival, stamp, outputs);
+  };
+  hooks.moved = [this](double stamp, const double* inputs) { take_inputs(stamp, inputs); };
+}
 void MeasurementLog::close() { form_->close(); }
 
 }  // namespace rhec::sim

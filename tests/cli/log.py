@@ -124,7 +124,7 @@ class Suite(Findings):
         self.expect("interpolated" in smoothed.stdout, "smoothed", smoothed.stdout)
         variants = {row["variant"] for row in self.rows("smooth")}
         self.expect(variants == {"stranger", "stranger causal"}, "variants of a smoothing", f"{variants}")
-        self.refused("there is no page yet", "report", self.work / "out", "-o", self.work / "page.html")
+        self.expect(self.rhec("report", self.work / "out", "-o", self.work / "page.html").returncode == FINE, "report", "of an estimation")
         proposal = self.run("log", log, "--vehicle", "unicycle_traction").stdout
         self.expect("{from: [lat, lon, height], as: east}" in proposal, "a proposal for columns", proposal)
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""`rhec report` of a log: a drive as long as a real one, with gaps, filtered and smoothed.
+"""`rhec report` of a log: a drive as long as a real one, with gaps, filtered and smoothed; and one with a robot's own sensors.
 
     report_log.py <rhec>
 """
@@ -15,7 +15,7 @@ from reports import Reports, close, rows_of
 
 
 class LogReports(Reports):
-    parts = ("log_of_1500_seconds", "smoothed_log")
+    parts = ("log_of_1500_seconds", "smoothed_log", "log_of_own_sensors")
 
     def log_of_1500_seconds(self):
         """A drive with gaps, as long as a real one."""
@@ -82,6 +82,63 @@ class LogReports(Reports):
             self.expect(variant["horizons"] is None and all(map(close, variant["track"]["x"], (float(row["x_pos"]) for row in nodes))),
                         variant["name"], "track")
         self.expect("smoother" in self.notes(document, "horizons"), "smooth", f"notes: {document['notes']}")
+
+    def log_of_own_sensors(self):
+        """A robot's own sensors, with a spike and a sensor that falls silent; by two estimators, and with hindsight."""
+        scenario, log, folder = cli.ROOT / "scenarios" / "skid_steer.yaml", self.work / "drive.csv", self.work / "own"
+        faults = "faults=[{kind: spike, start: 20, sensors: [x_gps, y_gps], size: 30}, {kind: dropout, start: 30, length: 4, sensors: [x_gps, y_gps]}]"
+        self.expect(self.rhec("run", scenario, *cli.assignments("seed=7", faults), "--log", log, "--out", self.work / "world").returncode == FINE,
+                    "own sensors", "run")
+        both = cli.assignments("variants={rhe: {estimator.name: rhe}, ekf: {estimator.name: ekf}}")
+        result = self.rhec("estimate", scenario, log, *both, "--out", folder)
+        self.expect(result.returncode == FINE, "own sensors", result.stderr)
+        document, _ = self.page_of(folder)
+        summary = json.loads((folder / "summary.json").read_text())
+        tables = {name: rows_of(folder / f"{name}.csv") for name in ("estimates", "innovations", "measurements", "predictions")}
+        self.expect(document["kind"] == "log" and document["summary"] == summary, "own sensors", "the summary is not summary.json")
+        measured = [row for row in tables["measurements"] if row["x_gps"]]
+        self.expect(document["fixes"]["total"] == len(measured) and all(map(close, document["fixes"]["x"], (float(row["x_gps"]) for row in measured))),
+                    "own sensors", "fixes")
+        withheld = summary["variants"]["rhe"]["held_out"]["count"]
+        self.expect(sum(document["fixes"]["held_out"]) == sum(row["held_out"] == "1" for row in measured) == withheld, "own sensors", "withheld fixes")
+        self.expect(any(close(gap["to"] - gap["from"], 4.2, absolute=0.3) for gap in document["gaps"]), "own sensors", f"gaps {document['gaps']}")
+        self.expect([variant["name"] for variant in document["variants"]] == ["rhe", "ekf"], "own sensors", "variants")
+        for variant in document["variants"]:
+            self.check_drive(variant, {name: [row for row in rows if row.get("variant") == variant["name"]] for name, rows in tables.items()},
+                             document, summary["variants"][variant["name"]])
+        self.expect(document["variants"][0]["horizons"] and document["variants"][1]["horizons"] is None, "own sensors", "windows")
+        figures = self.work / "own_figures"
+        self.expect(self.rhec("report", folder, "-o", self.work / "page.html", "--svg", figures).returncode == FINE, "own sensors", "--svg")
+        names = {file.stem for file in figures.iterdir()}
+        self.expect({"track", "rhe-innovations-heading", "rhe-innovations-x-gps-and-y-gps", "ekf-residuals", "window-map"} <= names, "own sensors",
+                    f"figures {sorted(names)}")
+        for name, cut, words in (("innovations.csv", None, ("innovations.csv", "is missing")), ("estimates.csv", 100, ("estimates.csv:100", "summary.json says"))):
+            broken = self.copy_of(folder, "broken own")
+            if cut is None:
+                (broken / name).unlink()
+            else:
+                (broken / name).write_text("".join((broken / name).read_text().splitlines(keepends=True)[:cut]))
+            self.refused(broken, *words, "rhec estimate")
+        smoothed = self.work / "own_smoothed"
+        self.expect(self.rhec("smooth", scenario, log, "--out", smoothed).returncode == FINE, "own sensors", "smooth")
+        document, _ = self.page_of(smoothed)
+        self.expect([variant["name"] for variant in document["variants"]] == ["skid_steer", "skid_steer causal"], "own sensors", "smoothed variants")
+        self.expect("smoother" in self.notes(document, "horizons"), "own sensors", f"notes: {document['notes']}")
+
+    def check_drive(self, variant, tables, document, numbers):
+        name, rows = variant["name"], tables["estimates"]
+        for series in variant["states"] + variant["parameters"]:
+            values = [float(row[series["name"]]) for row in rows]
+            self.expect(len(series["estimate"]) == len(rows) and all(map(close, series["estimate"], values)), name, series["name"])
+        self.expect({sensor["sensor"] for sensor in variant["innovations"]} == set(numbers["innovations"]), name, "sensors")
+        for sensor in variant["innovations"]:
+            told = [row for row in tables["innovations"] if row["sensor"] == sensor["sensor"]]
+            self.expect(sum(sensor["is_rejected"]) == sum(row["accepted"] == "0" for row in told) == sensor["rejected"], name, "rejected")
+            self.expect(all(map(close, sensor["values"], (float(row["nis"]) for row in told))), name, f"NIS of {sensor['sensor']}")
+        self.expect(any(sensor["rejected"] for sensor in variant["innovations"]), name, "the spike is not there")
+        self.expect(len(variant["residuals"]["values"]) == numbers["held_out"]["count"], name, "predictions")
+        bad = [float(row["time"]) for row in rows if row["health"] != "ok"]
+        self.expect(bad and all(any(span["from"] - 1e-3 <= time <= span["to"] + 1e-3 for span in variant["findings"]) for time in bad), name, "findings")
 
     def check_variant(self, variant, rows, document, summary):
         name, nodes = variant["name"], [row for row in rows if row["held_out"] == "0"]

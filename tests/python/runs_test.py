@@ -190,7 +190,7 @@ def test_a_drive_is_smoothed(run):
     assert error["hindsight"] < 0.8 * error["causal"]
     numpy.testing.assert_array_equal(smoothed.causal["kappa"], run.steps["kappa"])
     assert "<svg" in smoothed._repr_html_()
-    with pytest.raises(rhec.Error, match="both dead_reckoning and gps"):
-        rhec.smooth(FIGURE8, dead_reckoning="DRS.txt")
+    with pytest.raises(rhec.Error, match="gps alone, expected dead reckoning"):
+        rhec.smooth(FIGURE8, gps="GPS.txt")
     with pytest.raises(rhec.Error, match="those of a recorded drive"):
         rhec.smooth(FIGURE8, hold_out=5)

@@ -30,10 +30,9 @@ class DrivenLogTest : public FolderTest {
   RunLog drive(const Settings& settings, const std::string& name) const {
     const Scenario scenario(Host(), settings);
     MeasurementLog log(file(name), scenario.robot().model()->description());
-    RunLog run = run_closed_loop(
-        scenario,
-        {.measured = [&](double arrival, double stamp, const double* y) { log.take_outputs(arrival, stamp, y); },
-         .moved = [&](double stamp, const double* u) { log.take_inputs(stamp, u); }});
+    LoopHooks hooks;
+    log.listen(hooks);
+    RunLog run = run_closed_loop(scenario, hooks);
     log.close();
     return run;
   }

@@ -6,7 +6,7 @@ import {placeFigures} from "./place.js";
 import {columnFigure, errorFigures, estimateFigures, inputFigures, statusFigure} from "./series.js";
 import {hasCells, startState, sweepFigures} from "./sweep.js";
 import {solveTimeFigure} from "./times.js";
-import {trackFigure} from "./log.js";
+import {innovationFigure, trackFigure} from "./log.js";
 import {blockColours, parameterToColour, stripHeight, stripOption, stripRows, windowMapOption, windowWords} from "./window.js";
 import {stem} from "../text.js";
 
@@ -48,13 +48,14 @@ function logSections(document) {
   document.variants.forEach((variant, v) => {
     const prefix = document.variants.length > 1 ? `${stem(variant.name)}-` : "", of = document.variants.length > 1 ? ` (${variant.name})` : "";
     const source = {...variant, times: document.times};
-    const {states, parameters} = estimateFigures(document, source, prefix);
+    const {states, parameters} = estimateFigures(variant.findings ? {...document, findings: variant.findings} : document, source, prefix);
+    const innovations = (variant.innovations || []).map((sensor) => innovationFigure(document, sensor, prefix));
     const residuals = variant.residuals && variant.residuals.values.some((value) => value !== null) && columnFigure(document, {
-      name: `${prefix}residuals`, title: `Distance of the antenna from each fix${of}`, caption: "By the estimate; of a fix that was withheld, by the prediction of it.",
+      name: `${prefix}residuals`, title: `${variant.residuals.title}${of}`, caption: variant.residuals.caption,
       about: ["fixes"], label: "distance", unit: "m", time: columnOf(document, variant.residuals.time), values: variant.residuals.values, log: true, dots: true, colour: "measured"});
     const named = (figure) => figure && {...figure, title: `${figure.title}${of}`};
     sections.push({id: `variant-${v}`, title: document.variants.length > 1 ? `Estimator ${variant.name}` : "Estimates", isFolded: v > 0, ofVariant: variant.name,
-      figures: [...parameters.map(named), ...states.map(named), residuals, named(solveTimeFigure(document, source, prefix)), named(statusFigure(document, source, prefix))]});
+      figures: [...parameters.map(named), ...states.map(named), ...innovations.map(named), residuals, named(solveTimeFigure(document, source, prefix)), named(statusFigure(document, source, prefix))]});
   });
   return sections;
 }

@@ -1,22 +1,30 @@
 // The track of a recorded drive, beside the fixes that it was estimated from.
+import {count, number, percent, stem} from "../text.js";
+import {columnFigure} from "./series.js";
 import {addDots, addFrame, addLegend, addLine, base, equalAxes, extentOf, pairs} from "./parts.js";
 
 const margins = {left: 62, right: 16, top: 50, bottom: 46};
 const inside = (share, low, high) => Math.min(Math.max(share, low), high);
+
+/// What the extents of fixes and of a track have in common, with some room for noise; that of the fixes if that is nothing.
+function shared([low, high], [trackLow, trackHigh]) {
+  const room = 0.1 * (trackHigh - trackLow), common = [Math.max(low, trackLow - room), Math.min(high, trackHigh + room)];
+  return common[1] > common[0] ? common : [low, high];
+}
 
 export function trackFigure(document) {
   const tracks = document.variants.filter((variant) => variant.track);
   if (tracks.length === 0) return null;
   const {fixes} = document;
   const bounds = () => {
-    // Fixes alone say how much to show: an estimator that is lost for a while must not shrink all the others.
-    const [x, y] = fixes && fixes.x.length ? [extentOf(fixes.x), extentOf(fixes.y)] : [extentOf(tracks[0].track.x), extentOf(tracks[0].track.y)];
+    // Neither an estimator that is lost for a while nor a fix far off must shrink all the others.
+    const [x, y] = ["x", "y"].map((axis) => (fixes && fixes.x.length ? shared(extentOf(fixes[axis]), extentOf(tracks[0].track[axis])) : extentOf(tracks[0].track[axis])));
     const grow = ([low, high]) => [low - 0.08 * (high - low), high + 0.08 * (high - low)];
     return [grow(x), grow(y)];
   };
   return {
     name: "track", title: "Estimated track and position fixes",
-    caption: "Both axes have the same scale; what lies far outside the fixes is cut off.", about: ["map", "fixes", "samples"], marksPosition: true,
+    caption: "Both axes have the same scale; what lies far outside of fixes or track is cut off.", about: ["map", "fixes", "samples"], marksPosition: true,
     height: (width) => {
       const [x, y] = bounds(), inner = width - margins.left - margins.right;
       return Math.round(inner * inside((y[1] - y[0]) / Math.max(x[1] - x[0], 1e-9), 0.3, width < 500 ? 1.2 : 0.8) + margins.top + margins.bottom);
@@ -51,4 +59,17 @@ export function trackFigure(document) {
       rows: (fixes ? [["fixes", fixes]] : []).concat(tracks.map((variant) => [variant.name, variant.track]))
         .map(([name, line]) => [name, line.x.length, ...extentOf(line.x), ...extentOf(line.y)])}),
   };
+}
+
+/// What a sensor measured less what was expected of it, relative to what that should be.
+export function innovationFigure(document, sensor, prefix) {
+  const all = sensor.used + sensor.rejected;
+  const outputs = Object.keys(sensor.outputs).map((name) => [name, sensor.outputs[name]]).filter(([, output]) => output.rms !== null)
+    .map(([name, {rms, expected, correlation}]) => `${name}: ${number(rms)} RMS, ${number(expected)} stated, correlation with the next ${number(correlation, 2)}`);
+  return columnFigure(document, {
+    name: `${prefix}innovations-${stem(sensor.sensor)}`, title: `Innovations of ${sensor.sensor}`,
+    caption: `Normalised innovation squared: ${number(sensor.mean)} on average, ${number(sensor.expected)} (dashed) to be expected. ` +
+             `${count(sensor.rejected)} of ${count(all)} rejected${all ? ` (${percent(sensor.rejected / all)})` : ""}. ${outputs.join("; ")}.`,
+    about: ["innovations", "samples"], label: "NIS", unit: "", time: document.times[sensor.time], values: sensor.values, log: true, dots: true,
+    colour: "measured", expected: sensor.expected, marked: {name: "rejected", is: sensor.is_rejected}});
 }

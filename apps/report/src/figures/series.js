@@ -140,26 +140,32 @@ export function estimateFigures(document, source = document, prefix = "") {
 }
 
 /// One column in one frame: an error of the run, or how far fixes are from the estimate.
-export function columnFigure(document, {name, title, caption, about, label, unit, time, values, colour = "reference", zero = false, dots = false, log = false, expected = null}) {
+export function columnFigure(document, {name, title, caption, about, label, unit, time, values, colour = "reference", zero = false, dots = false, log = false, expected = null, marked = null}) {
   return {
     name, title, caption, about, time: () => time, frames: 1, height: () => 220,
     option: (look, {width, height, view}) => {
-      const option = base(look), part = inView(time, view, {values});
-      const range = log ? powersOf(part.values) : axisRange(extentOf(part.values, [expected]), {zero}), top = isKnown(expected) ? TOP : 12;
+      const option = base(look), part = inView(time, view, {values, marks: marked ? marked.is : null});
+      const range = log ? powersOf(part.values, isKnown(expected) ? expected / 100 : null) : axisRange(extentOf(part.values, [expected]), {zero}), top = isKnown(expected) || marked ? TOP : 12;
       const frame = addFrame(option, look, {top, height: height - top - BOTTOM, width, x: timeAxis(time, view),
         y: {name: withUnit(label, unit), ...range}});
       for (const {name: kind, spans, colour: shade} of stripesOf(document))
         addStripes(option, frame, kind, spans, look[shade], [range.min, range.max]);
-      if (dots) addDots(option, frame, label, pairs(part.time, part.values), look[colour], {symbolSize: 3});
+      const isMarked = (i) => Boolean(part.marks && part.marks[i]), points = pairs(part.time, part.values), names = [label];
+      if (dots) addDots(option, frame, label, points.filter((_, i) => !isMarked(i)), look[colour], {symbolSize: 3});
       else addLine(option, frame, label, pairs(part.time, part.values), {color: look[colour]});
+      if (marked && marked.is.some(Boolean)) {
+        addDots(option, frame, marked.name, points.filter((_, i) => isMarked(i)), look.alarm, {symbol: "diamond", symbolSize: 6});
+        names.push(marked.name);
+      }
       if (isKnown(expected)) {
         addLine(option, frame, "expected", part.time.map((at) => [at, expected]), {color: look.truth, type: "dashed"});
-        addLegend(option, look, [label, "expected"]);
+        names.push("expected");
       }
+      if (names.length > 1) addLegend(option, look, names);
       option.tooltip = tooltip(look);
       return option;
     },
-    table: () => ({columns: ["time [s]", withUnit(label, unit)], parts: [time, values]}),
+    table: () => ({columns: ["time [s]", withUnit(label, unit)].concat(marked ? [marked.name] : []), parts: [time, values].concat(marked ? [marked.is] : [])}),
   };
 }
 
@@ -175,10 +181,10 @@ export function errorFigures(document) {
   }));
 }
 
-/// A logarithmic axis over all positive values.
-function powersOf(values) {
+/// A logarithmic axis over all positive values, six powers of ten at most; or from a value of interest on.
+function powersOf(values, least = null) {
   const [low, high] = extentOf(values.filter((value) => value > 0)).map((value) => Math.log(value) / Math.LN10);
-  return {type: "log", min: Math.pow(10, Math.floor(Math.max(low, high - 6))), max: Math.pow(10, Math.ceil(high + 1e-9))};
+  return {type: "log", min: Math.pow(10, Math.floor(least === null ? Math.max(low, high - 6) : Math.log(least) / Math.LN10)), max: Math.pow(10, Math.ceil(high + 1e-9))};
 }
 
 const asColumn = (bound, length) => (Array.isArray(bound) ? bound : isKnown(bound) ? new Array(length).fill(bound) : null);

@@ -11,8 +11,12 @@
 #include "rhec/sim/logs/recorded_log.hpp"
 #include "rhec/sim/loop/closed_loop.hpp"
 #include "rhec/sim/problems/recording_solver.hpp"
+#include "rhec/sim/replay/replay_input.hpp"
 
 namespace rhec::sim {
+
+/// Windows kept for a report of a recorded drive, over all variants.
+inline constexpr std::int64_t most_windows_of_log = 1500;
 
 /// Records the estimator's windows and the controller's plans of a loop for `rhec report`: for every n-th sample, and
 /// for each sample whose solver result was unusable. Measurements at a node are stored once.
@@ -46,6 +50,8 @@ class RHEC_EXPORT HorizonLog {
 RHEC_EXPORT std::string horizons_text(const HorizonLog& horizons, const RunLog& log, const Scenario& scenario);
 RHEC_EXPORT std::string horizons_text(const std::vector<HorizonLog>& horizons, const RecordedLog& log,
                                       const LogScenario& scenario, const HoldOut& hold_out,
+                                      const std::vector<std::string>& suffixes = {""});
+RHEC_EXPORT std::string horizons_text(const std::vector<HorizonLog>& horizons, const ReplayInput& input,
                                       const std::vector<std::string>& suffixes = {""});
 
 }  // namespace rhec::sim

@@ -32,6 +32,11 @@ struct AccuracySummary {
   std::vector<SensorSummary::Output> outputs;  ///< `rms` alone
 };
 
+/// The entry that belongs to an output of the model, of what an innovation has of its sensor's outputs: `values` or
+/// `sigmas`. NaN for outputs of other sensors, and where some are missing, since it is not known which.
+RHEC_EXPORT double of_output(const std::vector<double>& entries, const DriveInnovation& innovation,
+                             const DriveReplay& replay, int output) noexcept;
+
 RHEC_EXPORT std::vector<SensorSummary> summarise_innovations(const DriveReplay& replay, const Robot& robot);
 RHEC_EXPORT AccuracySummary summarise_predictions(const DriveReplay& replay, const Robot& robot);
 
@@ -42,6 +47,9 @@ struct DriveResult {
 
 /// The files of a drive. Rows of a result that has a smoothed estimate are in `all`.
 RHEC_EXPORT std::string drive_estimates_csv(const std::vector<DriveResult>& results, const Robot& robot);
+/// What was measured of the outputs, in the order of arrival, and which of it `result` predicted without having seen
+/// it.
+RHEC_EXPORT std::string measurements_csv(const DriveResult& result, const Robot& robot, const logs::Drive& drive);
 RHEC_EXPORT std::string innovations_csv(const std::vector<DriveResult>& results, const Robot& robot);
 RHEC_EXPORT std::string predictions_csv(const std::vector<DriveResult>& results, const Robot& robot);
 RHEC_EXPORT std::string drive_times_csv(const std::vector<DriveResult>& results);

@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "rhec/core/model/model.hpp"
+#include "rhec/sim/problems/recording_solver.hpp"
 
 namespace rhec::sim {
 
@@ -21,6 +22,8 @@ class RHEC_EXPORT MeasurementLog {
   /// As LoopHooks::measured and LoopHooks::moved; times in [s].
   void take_outputs(double arrival, double stamp, const double* outputs);
   void take_inputs(double stamp, const double* inputs);
+  /// Takes what the loop with these hooks tells; they must not outlive this.
+  void listen(LoopHooks& hooks);
   /// Puts the file in its place.
   void close();
 
