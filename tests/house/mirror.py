@@ -77,6 +77,8 @@ UNTESTED = {
     "sim/problems/problem_dump.cpp": "tests/cli/dump.py: what a loop saves, attempts and failures, and its replay",
     "sim/report/report_comparison.cpp": "tests/cli/report_study.py: needs a comparison's files, which that test makes",
     "sim/report/report_horizons.cpp": "tests/cli/report_run.py: needs a run's horizons.jsonl, which that test makes",
+    "sim/report/log_page.cpp": "tests/cli/report_log.py: needs an estimation's files, which that test makes",
+    "sim/report/report_drive.cpp": "tests/cli/report_log.py: needs an estimation's files, which that test makes",
     "sim/report/report_log.cpp": "tests/cli/report_log.py: needs an estimation's files, which that test makes",
     "sim/report/report_map.cpp": "tests/cli/map.py: needs the map of a drive, which that test makes",
     "sim/report/report_run.cpp": "tests/cli/report_run.py: needs a run's files, which that test makes",
