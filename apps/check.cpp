@@ -18,6 +18,7 @@
 #include "rhec/plugins/yaml/yaml.hpp"
 #include "rhec/sim/check/model_check.hpp"
 #include "rhec/sim/check/term_check.hpp"
+#include "rhec/sim/files/json.hpp"
 #include "rhec/sim/loop/scenario.hpp"
 #include "rhec/sim/world/truth_estimator.hpp"
 
@@ -169,6 +170,12 @@ Settings section_of_term(const CheckArguments& arguments) {
   return section;
 }
 
+void print_term(const sim::TermCheck& found) {
+  print_findings(found.findings);
+  print_vehicles(found);
+  fmt::print("\n{}: {} failed, {} warnings\n", found.term, found.count(Verdict::fail), found.count(Verdict::warn));
+}
+
 int check_term(const Host& host, const CheckArguments& arguments) {
   if (arguments.graph)
     throw Error("--graph: it draws the formula of a model; of a term --trace prints it node by node");
@@ -190,11 +197,21 @@ int check_term(const Host& host, const CheckArguments& arguments) {
   if (arguments.json) {
     fmt::print("{}\n", sim::check_json(found));
   } else {
-    print_findings(found.findings);
-    print_vehicles(found);
-    fmt::print("\n{}: {} failed, {} warnings\n", found.term, found.count(Verdict::fail), found.count(Verdict::warn));
+    print_term(found);
   }
   return found.verdict() == Verdict::fail ? exit_not_solved : exit_fine;
+}
+
+/// The terms of a scenario's controller, on its vehicle.
+std::vector<sim::TermCheck> check_terms(const Host& host, const CheckArguments& arguments, const Settings& controller,
+                                        const Robot& robot) {
+  std::vector<sim::TermCheck> checks;
+  const Settings* terms = controller.find("terms");
+  if (!terms || terms->kind() != Settings::Kind::list) return checks;
+  for (const Settings& section : terms->items())
+    checks.push_back(
+        sim::check_term(host, section, {robot.model()}, {.seed = static_cast<std::uint64_t>(arguments.seed)}));
+  return checks;
 }
 
 int check(const CheckArguments& arguments) {
@@ -216,15 +233,25 @@ int check(const CheckArguments& arguments) {
     return show_trace(*model, start_of(host, arguments, is_scenario, robot, *model, options.speed), arguments.json);
   }
   const sim::ModelCheck found = sim::check_model(host, robot, options);
+  const std::vector<sim::TermCheck> terms = check_terms(host, arguments, robot_options.controller, robot);
   if (arguments.json) {
-    fmt::print("{}\n", sim::check_json(found));
+    sim::Json all = sim::Json::parse(sim::check_json(found));
+    all["terms"] = sim::Json::array();
+    for (const sim::TermCheck& term : terms) all["terms"].push_back(sim::Json::parse(sim::check_json(term)));
+    fmt::print("{}\n", all.dump(2));
   } else {
     print_findings(found.findings);
     print_drives(found);
     print_times(found);
     fmt::print("\n{}: {} failed, {} warnings\n", found.model, found.count(Verdict::fail), found.count(Verdict::warn));
+    for (const sim::TermCheck& term : terms) {
+      fmt::print("\nTERM {}\n", term.term);
+      print_term(term);
+    }
   }
-  return found.verdict() == Verdict::fail ? exit_not_solved : exit_fine;
+  const bool fails = found.verdict() == Verdict::fail ||
+                     std::ranges::any_of(terms, [](const auto& term) { return term.verdict() == Verdict::fail; });
+  return fails ? exit_not_solved : exit_fine;
 }
 
 }  // namespace
@@ -251,7 +278,8 @@ void add_check(Program& program) {
   command
       .add("model", arguments->model,
            "a model plugin, a vehicle's equations (*.yaml), or a scenario (*.yaml), whose model is looked at with its "
-           "noise, bounds, step, horizon and blocking; or a term plugin, or a term's equations (*.yaml)")
+           "noise, bounds, step, horizon and blocking, and the terms of its controller; or a term plugin, or a term's "
+           "equations (*.yaml)")
       .value("MODEL")
       .required();
   add_assignments(command, arguments->assignments, "an option of the model or the term, or a key of the scenario");

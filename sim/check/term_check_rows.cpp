@@ -76,6 +76,12 @@ class RowCheck {
         if (std::isnan(lower) || std::isnan(upper))
           fail(where, fmt::format("a bound is NaN or was not written {}", text_of(place)),
                "write both bounds of each limit; an infinite one turns it off");
+        else if (lower > upper && is_for_want_of_room(formula, place, k))
+          warn(where,
+               fmt::format("lower is {:g}, above upper, which is {:g}, where the path has room of {:.3g} m to the left "
+                           "and {:.3g} m to the right",
+                           lower, upper, place.left, place.right),
+               "there is no plan on a path with so little room, unless the limit is soft");
         else if (lower > upper)
           fail(where, fmt::format("lower is {:g}, above upper, which is {:g}, {}", lower, upper, text_of(place)),
                "let lower be at most upper at every node: else there is no plan");
@@ -95,6 +101,16 @@ class RowCheck {
  private:
   void fail(const std::string& where, std::string found, std::string advice) {
     if (told_.insert(where + advice).second) findings_.fail(where, std::move(found), std::move(advice));
+  }
+  void warn(const std::string& where, std::string found, std::string advice) {
+    if (told_.insert(where + advice).second) findings_.warn(where, std::move(found), std::move(advice));
+  }
+  /// Whether it is the path that leaves too little room: with more of it the bounds do not cross.
+  static bool is_for_want_of_room(const TermFormula& formula, const TermPlace& place, std::size_t limit) {
+    TermPlace open = place;
+    open.left = open.right = infinity;
+    const NodeNumbers found = formula.at(open);
+    return found.lower[limit] <= found.upper[limit];
   }
   static std::string text_of(const TermPlace& place) {
     return fmt::format(

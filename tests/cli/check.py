@@ -135,6 +135,18 @@ class Test(cli.Findings):
         self.expect(louder[0] > 1.5 * sigma[0] and sigma[3] is None, "noise", f"{sigma} -> {louder}")
         self.check("a recorded drive's", cli.ROOT / "scenarios" / "victoria_park.yaml")
 
+    def terms_of_a_scenario(self):
+        obstacles = cli.ROOT / "scenarios" / "obstacles.yaml"
+        found = self.check("obstacles", obstacles)
+        # A path may leave less room than the corridor's margins.
+        self.expect([term["verdict"] for term in found["terms"]] == ["warn", "pass", "pass"], "obstacles", f"{found['terms']}")
+        self.expect([term["term"] for term in found["terms"]] == ["corridor", "obstacles", "lateral_acceleration"], "obstacles", f"{found['terms']}")
+        self.expect(all([each["vehicle"] for each in term["vehicles"]] == ["bicycle_slip"] for term in found["terms"]), "obstacles", "vehicles")
+        self.expect("TERM corridor\n" in self.rhec("check", obstacles).stdout, "obstacles", "the table has no terms")
+        root = "controller.terms=[{equations: {name: mine, states: [y_pos], limits: {root: {term: sqrt(y_pos), upper: 3}}}}]"
+        found = self.check("a root of what may be negative", obstacles, *assignments(root), code=NOT_SOLVED)
+        self.expect(found["verdict"] != "fail" and found["terms"][0]["verdict"] == "fail", "root", f"{found['terms']}")
+
     def errors_of_sensors(self):
         """Biases and scale errors on every vehicle: what GPS and the start share is named, and what is seen has a sigma."""
         gyro = cli.ROOT / "scenarios" / "gyro.yaml"
@@ -196,7 +208,7 @@ class Test(cli.Findings):
 
 def main():
     test = Test(Program(sys.argv[1]))
-    for part in (test.every_model, test.every_term, test.term_of_equations, test.scenario, test.errors_of_sensors, test.faults,
+    for part in (test.every_model, test.every_term, test.term_of_equations, test.scenario, test.terms_of_a_scenario, test.errors_of_sensors, test.faults,
                  test.bad_input, test.others):
         part()
     test.tell()

@@ -1,6 +1,7 @@
 // What a term says of itself and writes for nodes: one fault each.
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <atomic>
 #include <limits>
 #include <memory>
@@ -41,6 +42,16 @@ TEST(RowsOfATerm, HaveLowerBoundsBelowUpperOnes) {
   EXPECT_EQ(found.verdict, Verdict::fail);
   EXPECT_EQ(found.where, "limit 'edge'");
   EXPECT_THAT(found.found, AllOf(HasSubstr("lower is 2, above upper, which is 1"), HasSubstr("arc_length is")));
+}
+
+TEST(RowsOfATerm, MayCrossWhereThePathLeavesNoRoom) {
+  const Finding found = of_rows([](const TermPlace& place, double* data, double* lower, double* upper) {
+    *data = 0.0;
+    *lower = -1.0;
+    *upper = std::min(place.left, 3.0) - 2.0;
+  });
+  EXPECT_EQ(found.verdict, Verdict::warn);
+  EXPECT_THAT(found.found, HasSubstr("where the path has room of "));
 }
 
 TEST(RowsOfATerm, AreAllWritten) {
