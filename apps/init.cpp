@@ -161,7 +161,10 @@ void add_init(Program& program) {
   command.add("--vehicle", arguments->vehicle, "a model of 'rhec plugins', or a vehicle's equations (*.yaml)")
       .value("NAME|FILE");
   command
-      .add("--sensors", arguments->sensors, "outputs of the model, with commas between them; otherwise the usual ones")
+      .add("--sensors", arguments->sensors,
+           "outputs of the model, or parts of their names (gps: x_gps and y_gps), with commas between them; otherwise "
+           "the "
+           "usual ones")
       .value("A,B,...");
   add_assignments(command, arguments->assignments, "an option of the model");
   command.add_flag("--force", arguments->force, "replace files that are there");

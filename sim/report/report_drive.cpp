@@ -161,7 +161,7 @@ class DriveReport : LogPage {
                       {"mean", told.at("nis")},
                       {"expected", told.at("nis_expected")},
                       {"outputs", told.at("outputs")},
-                      {"time", time_key(name + " innovations of " + of_name, of.times, thinned)},
+                      {"time", time_key(fmt::format("{} innovations of {}", name, of_name), of.times, thinned)},
                       {"values", column_of(of.nis, thinned.rows)},
                       {"is_rejected", flags(of.rejected, thinned.rows)}});
     }

@@ -74,11 +74,16 @@ std::shared_ptr<Model> make_vehicle(const Host& host, const StarterWishes& wishe
   return host.make_model(wishes.vehicle, options);
 }
 
+/// Whether an output is meant by a word: its name, or a part of that, such as the gps of x_gps and y_gps.
+bool is_meant(const std::string& output, const std::string& word) {
+  return !word.empty() && ("_" + output + "_").find("_" + word + "_") != std::string::npos;
+}
+
 /// The outputs that are measured, in the model's order.
 std::vector<Variable> chosen_sensors(const StarterWishes& wishes, const ModelDescription& about) {
   const std::vector<std::string> known = names_of(about.outputs);
   for (const std::string& name : wishes.sensors) {
-    if (std::find(known.begin(), known.end(), name) != known.end()) continue;
+    if (std::ranges::any_of(known, [&](const std::string& output) { return is_meant(output, name); })) continue;
     const std::string near = nearest(name, known);
     throw Error(fmt::format("the vehicle '{}' has no sensor '{}'; {}", wishes.vehicle, name,
                             near.empty() ? fmt::format("it could have {}", fmt::join(known, ", "))
@@ -86,7 +91,8 @@ std::vector<Variable> chosen_sensors(const StarterWishes& wishes, const ModelDes
   }
   std::vector<Variable> chosen;
   for (const Variable& output : about.outputs) {
-    const bool is_named = std::find(wishes.sensors.begin(), wishes.sensors.end(), output.name) != wishes.sensors.end();
+    const bool is_named =
+        std::ranges::any_of(wishes.sensors, [&](const std::string& word) { return is_meant(output.name, word); });
     if (wishes.sensors.empty() ? output.usual : is_named) chosen.push_back(output);
   }
   return chosen;

@@ -45,6 +45,15 @@ TEST(StarterFiles, AreOfTheSensorsAndOptionsThatAreWished) {
   EXPECT_EQ(robot.model_choice().options.find("wheelbase")->as_number(), 2.5);
 }
 
+TEST(StarterFiles, TakePartsOfNamesForAllSensorsOfThem) {
+  StarterWishes named = bicycle(), meant = bicycle();
+  named.sensors = {"x_gps", "y_gps", "delta"};
+  meant.sensors = {"gps", "delta"};
+  EXPECT_EQ(starter_files(Host(), meant).robot, starter_files(Host(), named).robot);
+  meant.sensors = {"g"};
+  EXPECT_THROW(starter_files(Host(), meant), Error);
+}
+
 TEST(StarterFiles, RefuseWhatThereIsNot) {
   StarterWishes wishes = bicycle();
   wishes.sensors = {"x_gsp"};

@@ -15,7 +15,7 @@ namespace rhec::sim {
 struct StarterWishes {
   std::string name;                  ///< for titles
   std::string vehicle;               ///< a model plugin, or a file with a vehicle's equations
-  std::vector<std::string> sensors;  ///< outputs of the model; none: the usual ones
+  std::vector<std::string> sensors;  ///< outputs of the model, or parts of their names (gps); none: the usual ones
   Settings options;                  ///< of the model; a map, or null
   std::filesystem::path folder;      ///< where the files will be: a vehicle's file is named relative to it
 };
