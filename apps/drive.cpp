@@ -22,9 +22,9 @@ namespace rhec::apps {
 namespace {
 
 void print_signals(const logs::Drive& drive) {
-  fmt::print("{:<18} {:>8} {:>8}   {}\n", "SIGNAL", "VALUES", "MISSING", "FROM");
+  fmt::print("{:<18} {:>8} {:>8} {:>8}   {}\n", "SIGNAL", "VALUES", "MISSING", "LEFT OUT", "FROM");
   for (const logs::SignalCount& each : drive.signals)
-    fmt::print("{:<18} {:>8} {:>8}   {}\n", each.variable, each.values, each.missing, each.source);
+    fmt::print("{:<18} {:>8} {:>8} {:>8}   {}\n", each.variable, each.values, each.missing, each.left_out, each.source);
   if (drive.origin)
     fmt::print("local plane: origin {:.8f}, {:.8f} degrees, {:.3f} m\n", drive.origin->latitude,
                drive.origin->longitude, drive.origin->height);

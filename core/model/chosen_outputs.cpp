@@ -5,6 +5,8 @@
 #include <memory>
 #include <numeric>
 #include <optional>
+#include <set>
+#include <string>
 #include <utility>
 
 #include <fmt/format.h>
@@ -19,7 +21,7 @@ namespace {
 /// Evaluates all outputs of the model, some nodes at a time, and returns the chosen ones.
 class ChosenOutputs final : public Model {
  public:
-  ChosenOutputs(std::shared_ptr<Model> model, std::vector<int> chosen)
+  ChosenOutputs(std::shared_ptr<Model> model, std::vector<int> chosen, const std::vector<std::string>& names)
       : model_(std::move(model)), chosen_(std::move(chosen)), description_(model_->description()) {
     all_ = model_->output_count();
     const std::size_t a_node = static_cast<std::size_t>(all_) * (static_cast<std::size_t>(model_->state_count()) + 2);
@@ -29,7 +31,10 @@ class ChosenOutputs final : public Model {
     if (a_node > room) reserve_ = std::make_unique<Reserve>(a_node);
     nodes_at_once_ = static_cast<int>(std::max<std::size_t>(room / std::max<std::size_t>(a_node, 1), 1));
     description_.outputs.clear();
-    for (const int output : chosen_) description_.outputs.push_back(model_->description().outputs[output]);
+    for (std::size_t j = 0; j < chosen_.size(); ++j) {
+      description_.outputs.push_back(model_->description().outputs[chosen_[j]]);
+      if (!names.empty() && !names[j].empty()) description_.outputs.back().name = names[j];
+    }
     if (const VehicleGraph* all = model_->graph()) graph_ = formula_copy(*all, chosen_);
   }
 
@@ -79,7 +84,7 @@ class ChosenOutputs final : public Model {
       if (request.hessians) {
         std::fill_n(multipliers, count * all_, 0.0);
         for (int i = 0; i < count; ++i)
-          for (int j = 0; j < ny; ++j) multipliers[i * all_ + chosen_[j]] = request.multipliers[(first + i) * ny + j];
+          for (int j = 0; j < ny; ++j) multipliers[i * all_ + chosen_[j]] += request.multipliers[(first + i) * ny + j];
         part.multipliers = multipliers;
         part.hessians = request.hessians + first * nx * nx;
       }
@@ -139,21 +144,33 @@ std::vector<int> usual_outputs(const ModelDescription& about) {
   return usual;
 }
 
-std::shared_ptr<Model> with_outputs(std::shared_ptr<Model> model, const std::vector<int>& chosen) {
+OptionRow outputs_row() {
+  return {"outputs", "list of texts", "the usual ones", "all, or outputs of the model",
+          "what is measured; `{NAME: OUTPUT}`: by one more sensor of that name"};
+}
+
+std::shared_ptr<Model> with_outputs(std::shared_ptr<Model> model, const std::vector<int>& chosen,
+                                    const std::vector<std::string>& names) {
   const ModelDescription& about = model->description();
-  std::vector<bool> seen(about.outputs.size(), false);
-  for (const int output : chosen) {
-    if (output < 0 || output >= model->output_count())
-      throw Error(fmt::format("model '{}': output {} chosen; it has {}, counted from 0", about.name, output,
+  if (!names.empty() && names.size() != chosen.size())
+    throw Error(fmt::format("model '{}': {} outputs chosen with {} names", about.name, chosen.size(), names.size()));
+  std::set<std::string> called;
+  bool has_own_names = true;
+  for (std::size_t j = 0; j < chosen.size(); ++j) {
+    if (chosen[j] < 0 || chosen[j] >= model->output_count())
+      throw Error(fmt::format("model '{}': output {} chosen; it has {}, counted from 0", about.name, chosen[j],
                               model->output_count()));
-    if (seen[output])
-      throw Error(fmt::format("model '{}': output '{}' chosen twice", about.name, about.outputs[output].name));
-    seen[output] = true;
+    const std::string& own = about.outputs[chosen[j]].name;
+    const std::string& name = names.empty() || names[j].empty() ? own : names[j];
+    has_own_names = has_own_names && name == own;
+    // Models in programs need no names: then the outputs themselves must differ.
+    if (!called.insert(name.empty() ? fmt::format("output {}", chosen[j]) : name).second)
+      throw Error(fmt::format("model '{}': output '{}' chosen twice", about.name, name));
   }
   std::vector<int> all(about.outputs.size());
   std::iota(all.begin(), all.end(), 0);
-  if (chosen == all) return model;
-  return std::make_shared<ChosenOutputs>(std::move(model), chosen);
+  if (chosen == all && has_own_names) return model;
+  return std::make_shared<ChosenOutputs>(std::move(model), chosen, names);
 }
 
 }  // namespace rhec

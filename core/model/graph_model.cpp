@@ -285,14 +285,14 @@ void GraphModel::store_outputs(const NodeRows& q, int first, int count, bool wit
   }
 }
 
-/// The multipliers of the chosen outputs; those of all others are zero.
+/// The multipliers of the chosen outputs, of which one may be there twice; those of all others are zero.
 void GraphModel::set_weights(const NodeRows& q, int first, int count, double* registers, int lanes) const noexcept {
   double* const weights = registers + static_cast<std::ptrdiff_t>(n_.x) * lanes;
   std::fill_n(weights, n_.y * lanes, 0.0);
   const int chosen_count = q.chosen ? q.chosen_count : n_.y;
   for (int j = 0; j < chosen_count; ++j) {
     double* const weight = weights + static_cast<std::ptrdiff_t>(q.chosen ? q.chosen[j] : j) * lanes;
-    for (int i = 0; i < count; ++i) weight[i] = q.multipliers[(first + i) * q.multiplier_step + j];
+    for (int i = 0; i < count; ++i) weight[i] += q.multipliers[(first + i) * q.multiplier_step + j];
   }
 }
 

@@ -115,7 +115,7 @@ void Model::observe_rows(const NodeRows& q) const noexcept {
     std::fill_n(multipliers, q.count * all, 0.0);
     for (int i = 0; i < q.count; ++i)
       for (int j = 0; j < ny; ++j)
-        multipliers[i * all + (q.chosen ? q.chosen[j] : j)] = q.multipliers[i * q.multiplier_step + j];
+        multipliers[i * all + (q.chosen ? q.chosen[j] : j)] += q.multipliers[i * q.multiplier_step + j];
   }
   Nodes request;
   request.count = q.count;

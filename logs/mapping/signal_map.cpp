@@ -3,9 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <span>
 #include <utility>
 
 #include "rhec/core/base/error.hpp"
+#include "rhec/core/base/infinity.hpp"
 #include "rhec/logs/mapping/units.hpp"
 
 namespace rhec::logs {
@@ -49,6 +51,45 @@ std::vector<SignalName> names_in(const Settings& from) {
     throw from.mismatch("a signal, such as /odom:twist.twist.linear.x or the name of a column, or a list of them");
   }
   return names;
+}
+
+struct ConditionOptions {
+  std::string of;
+  std::optional<double> at_least, at_most;
+  static const OptionTable<ConditionOptions>& table() {
+    static const auto rows = OptionTable<ConditionOptions>()
+                                 .text("of", &ConditionOptions::of, "a signal of the same topic or table")
+                                 .optional_number("at_least", &ConditionOptions::at_least, "the least that it may be")
+                                 .optional_number("at_most", &ConditionOptions::at_most, "the most that it may be");
+    return rows;
+  }
+};
+
+std::vector<SignalCondition> conditions_in(const Settings& when) {
+  std::vector<SignalCondition> conditions;
+  const std::span<const Settings> each =
+      when.kind() == Settings::Kind::list ? std::span<const Settings>(when.items()) : std::span(&when, 1);
+  for (const Settings& item : each) {
+    const ConditionOptions options = ConditionOptions::table().parse(item, "a condition");
+    if (options.of.empty() || (!options.at_least && !options.at_most))
+      throw item.error("expected `of` and `at_least` or `at_most`, as in {of: \"/fix:status.status\", at_least: 2}");
+    const SignalCondition condition{parse_signal_name(options.of), options.at_least.value_or(-infinity),
+                                    options.at_most.value_or(infinity)};
+    if (!(condition.at_least <= condition.at_most)) throw item.error("expected at_least up to at_most");
+    conditions.push_back(condition);
+  }
+  return conditions;
+}
+
+/// A condition is looked at in the records that have the value.
+void check_topics(const MappedSignal& signal) {
+  for (const SignalCondition& condition : signal.conditions)
+    for (const SignalName& from : signal.from)
+      if (from.topic != condition.of.topic)
+        throw signal.options.when.error(
+            fmt::format("'{}{}{}' is in other records than the value itself; expected a signal {}", condition.of.topic,
+                        condition.of.topic.empty() ? "" : ":", condition.of.field,
+                        from.topic.empty() ? "of the table" : "of " + from.topic));
 }
 
 void check_count(const MappedSignal& signal, const Settings& entry) {
@@ -143,6 +184,10 @@ const OptionTable<SignalOptions>& SignalOptions::table() {
                   between(-most_delay, most_delay))
           .flag("derivative", &SignalOptions::derivative,
                 "the rate at which the signal changes between records, for an input that nothing measures")
+          .subtree(
+              "when", &SignalOptions::when,
+              "values count only in records in which this holds: `{of: SIGNAL, at_least: NUMBER, at_most: NUMBER}`, "
+              "or a list of such, of the same topic or table; e.g. the status or covariance of a fix")
           .text("clock", &SignalOptions::clock,
                 "what says when it was measured: `received`, or a field or column that counts seconds (`name [ms]`: "
                 "others); empty: `signals.clock`");
@@ -214,6 +259,8 @@ void SignalMap::add(const Settings& map, const std::vector<Variable>& variables,
         signal.from = names_in(keys.find("from") ? *keys.find("from") : keys);
         check_count(signal, *entry);
       }
+      if (!signal.options.when.is_null()) signal.conditions = conditions_in(signal.options.when);
+      check_topics(signal);
       set_factor(signal, *entry);
     }
     signals_.push_back(std::move(signal));
@@ -242,6 +289,7 @@ std::vector<MappedSignal> SignalMap::resolved(const Log& log) const {
       signal.from = {is_table ? SignalName{"", signal.variable.name}
                               : SignalName{own, fmt::format("position[{}]", signal.variable.name)}};
     }
+    check_topics(signal);
     result.push_back(std::move(signal));
   }
   return result;

@@ -47,7 +47,27 @@ struct SignalStream::Reading {
     std::size_t channel, field, slot;
   };
   std::vector<Use> uses;
+  struct Check {
+    std::size_t channel, slot;
+    SignalCondition condition;
+  };
+  std::vector<Check> checks;
   double least_lateness = std::numeric_limits<double>::infinity();
+
+  /// Where the value of a field will be; asks for it if nobody has.
+  std::size_t slot_of(const std::string& field) {
+    std::vector<std::string>& fields = request.fields;
+    const auto known = std::find(fields.begin(), fields.end(), field);
+    const auto slot = static_cast<std::size_t>(known - fields.begin());
+    if (known == fields.end()) fields.push_back(field);
+    return slot;
+  }
+  /// Whether all that a channel asks of a record holds.
+  bool counts_for(std::size_t channel) const noexcept {
+    return std::ranges::all_of(checks, [&](const Check& check) {
+      return check.channel != channel || check.condition.holds(values[check.slot]);
+    });
+  }
 };
 
 SignalStream::SignalStream(const Log& log, const SignalMap& map)
@@ -72,10 +92,11 @@ void SignalStream::add(const Log& log, MappedSignal signal) {
   const std::vector<SignalName> fields = fields_of(signal, type);
   for (std::size_t i = 0; i < fields.size(); ++i) {
     Reading& reading = reading_of(log.topic(fields[i].topic), signal.options.clock);
-    std::vector<std::string>& requested = reading.request.fields;
-    const auto known = std::find(requested.begin(), requested.end(), fields[i].field);
-    reading.uses.push_back({channels_.size(), i, static_cast<std::size_t>(known - requested.begin())});
-    if (known == requested.end()) requested.push_back(fields[i].field);
+    reading.uses.push_back({channels_.size(), i, reading.slot_of(fields[i].field)});
+  }
+  for (const SignalCondition& condition : signal.conditions) {
+    Reading& reading = reading_of(log.topic(condition.of.topic), signal.options.clock);
+    reading.checks.push_back({channels_.size(), reading.slot_of(condition.of.field), condition});
   }
   channel.fields.assign(fields.size(), no_value);
   channel.is_fresh.assign(fields.size(), false);
@@ -116,6 +137,10 @@ void SignalStream::read(const Record& record, Reading& reading) {
   values_.clear();
   for (const Reading::Use& use : reading.uses) {
     Channel& channel = channels_[use.channel];
+    if (!reading.counts_for(use.channel)) {
+      channel.count.left_out += use.field == 0;
+      continue;
+    }
     // Wheels may come one by one, each in a message of its own: what a message lacks is waited for.
     if (waits_for_all(channel.signal.options.form) && std::isnan(reading.values[use.slot])) continue;
     channel.fields[use.field] = reading.values[use.slot];

@@ -10,6 +10,7 @@
 #include <fmt/ranges.h>
 
 #include "definitions.hpp"
+#include "rhec/core/model/chosen_outputs.hpp"
 #include "rhec/core/model/graph_model.hpp"
 #include "vehicle_file.hpp"
 
@@ -227,7 +228,7 @@ std::vector<OptionRow> vehicle_options(const std::filesystem::path& file) {
     }
     rows.push_back({option.name, kind.type(), otherwise, kind.constraint(), option.described()});
   }
-  rows.push_back({"outputs", "list of texts", "the usual ones", "all, or outputs of the model", "what is measured"});
+  rows.push_back(outputs_row());
   return rows;
 }
 

@@ -60,9 +60,19 @@ std::vector<OptionRow> options_of(const Library& library) {
     throw Error(fmt::format("the options of {} '{}' cannot be told: {}", word_of(library.record.kind),
                             library.record.name, said(error)));
   }
-  if (library.record.kind == PluginKind::model)
-    rows.push_back({"outputs", "list of texts", "the usual ones", "all, or outputs of the model", "what is measured"});
+  if (library.record.kind == PluginKind::model) rows.push_back(outputs_row());
   return rows;
+}
+
+/// A sensor of the list `outputs`: its name, and the output that it measures. An output, or {NAME: OUTPUT}.
+std::pair<std::string, Settings> sensor_in(const Settings& item) {
+  if (item.kind() != Settings::Kind::map) return {item.as_text(), item};
+  if (item.members().size() != 1) throw item.mismatch("an output, or one more sensor of it, as in {x_gps_2: x_gps}");
+  const auto& [name, of] = item.members().front();
+  constexpr const char* letters = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_";
+  if (name.find_first_not_of(letters) != std::string::npos || (name[0] >= '0' && name[0] <= '9'))
+    throw item.error(fmt::format("found the name '{}', expected letters, digits and underscores", name));
+  return {name, of};
 }
 
 std::shared_ptr<Model> choose_outputs(std::shared_ptr<Model> model, const Settings& section) {
@@ -77,15 +87,23 @@ std::shared_ptr<Model> choose_outputs(std::shared_ptr<Model> model, const Settin
   if (wanted->kind() != Settings::Kind::list || wanted->items().empty())
     throw wanted->mismatch(fmt::format("'all' or a list of outputs: {}", fmt::join(known, ", ")));
   std::vector<int> chosen;
+  std::vector<std::string> names;
   for (const Settings& item : wanted->items()) {
-    const auto found = std::find(known.begin(), known.end(), item.as_text());
+    const auto [name, of] = sensor_in(item);
+    const auto found = std::find(known.begin(), known.end(), of.as_text());
     if (found == known.end())
-      throw item.mismatch(fmt::format("an output of the model '{}': {}", about.name, fmt::join(known, ", ")));
-    const auto output = static_cast<int>(found - known.begin());
-    if (std::find(chosen.begin(), chosen.end(), output) != chosen.end()) throw item.error("this output is named twice");
-    chosen.push_back(output);
+      throw of.mismatch(fmt::format("an output of the model '{}': {}", about.name, fmt::join(known, ", ")));
+    if (std::find(names.begin(), names.end(), name) != names.end())
+      throw item.error(
+          fmt::format("'{}' is named twice; another sensor that measures the same needs a name of its own, "
+                      "as in {{{}_2: {}}}",
+                      name, of.text(), of.text()));
+    if (name != of.text() && std::find(known.begin(), known.end(), name) != known.end())
+      throw item.error(fmt::format("'{}' is another output of the model; expected a name of its own", name));
+    chosen.push_back(static_cast<int>(found - known.begin()));
+    names.push_back(name);
   }
-  return with_outputs(std::move(model), chosen);
+  return with_outputs(std::move(model), chosen, names);
 }
 
 PluginTrial try_library(const Library& library, const Stage& stage) {

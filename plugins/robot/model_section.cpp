@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "rhec/core/model/chosen_outputs.hpp"
+
 namespace rhec {
 namespace {
 
@@ -31,7 +33,7 @@ OptionSection ModelSection::documentation() {
            {"equations", "text or map", "", "a file, *.yaml, or what it has",
             "in the place of a name: the vehicle's equations, which need no compiler (docs/equations.md); its options "
             "stand beside it"},
-           {"outputs", "list of texts", "the usual ones", "all, or outputs of the model", "what is measured"}}};
+           outputs_row()}};
 }
 
 PluginChoice ModelSection::choice() const { return vehicle.choice(section_); }

@@ -75,6 +75,50 @@ TEST(ChosenOutputs, AreThoseOfAllOutputsInTheOrderAskedFor) {
   }
 }
 
+TEST(ChosenOutputs, MayBeThereTwiceUnderAnotherName) {
+  const auto once = model_with("outputs: [x_trailer_gps, articulation]");
+  const auto twice = model_with("outputs: [x_trailer_gps, articulation, {x_rough: x_trailer_gps}]");
+  ASSERT_THAT(names_of(twice->description().outputs), ElementsAre("x_trailer_gps", "articulation", "x_rough"));
+  EXPECT_EQ(twice->description().outputs[2].unit, "m");
+  const std::size_t nx = once->state_count();
+  for (const std::string& set : twice->instruction_sets()) {
+    for (const auto& model : {once, twice}) ASSERT_TRUE(model->use_instruction_set(set));
+    const std::size_t count = 11;
+    testing::RandomProblem random(once, 3);
+    std::vector<double> states(count * nx), weights, sums;
+    for (double& value : states) value = random.uniform(-2.0, 2.0);
+    for (std::size_t i = 0; i < count; ++i) {
+      for (int j = 0; j < 3; ++j) weights.push_back(random.uniform(-1.0, 1.0));
+      sums.insert(sums.end(), {weights[3 * i] + weights[3 * i + 2], weights[3 * i + 1]});
+    }
+    const Observation one = observe(*once, states, sums), two = observe(*twice, states, weights);
+    for (std::size_t i = 0; i < count; ++i)
+      for (const auto& [from, to] : {std::pair{0, 0}, {1, 1}, {0, 2}}) {
+        EXPECT_EQ(two.outputs[i * 3 + to], one.outputs[i * 2 + from]);
+        for (std::size_t c = 0; c < nx; ++c)
+          EXPECT_EQ(two.jacobians[(i * nx + c) * 3 + to], one.jacobians[(i * nx + c) * 2 + from]);
+      }
+    // The weights of both count.
+    for (std::size_t k = 0; k < one.hessians.size(); ++k) EXPECT_NEAR(two.hessians[k], one.hessians[k], 1e-12);
+    // So they do in rows as solvers ask for them.
+    std::vector<double> rows(count * nx * padded(static_cast<int>(nx))), scratch(twice->rows_scratch(count));
+    twice->observe_rows({.count = static_cast<int>(count),
+                         .states = states.data(),
+                         .state_step = static_cast<std::ptrdiff_t>(nx),
+                         .multipliers = weights.data(),
+                         .multiplier_step = 3,
+                         .hessians = rows.data(),
+                         .hessian_step = static_cast<std::ptrdiff_t>(nx * padded(static_cast<int>(nx))),
+                         .hessian_row = padded(static_cast<int>(nx)),
+                         .scratch = scratch.data()});
+    for (std::size_t i = 0; i < count; ++i)
+      for (std::size_t r = 0; r < nx; ++r)
+        for (std::size_t c = 0; c < nx; ++c)
+          EXPECT_NEAR(rows[(i * nx + r) * padded(static_cast<int>(nx)) + c], one.hessians[(i * nx + c) * nx + r],
+                      1e-12);
+  }
+}
+
 TEST(ChosenOutputs, AskForNoMoreThanIsAskedFor) {
   const auto some = model_with("outputs: [articulation]");
   const std::vector<double> state = {1.0, 2.0, 0.3, 0.5, 0.1};
@@ -154,7 +198,10 @@ TEST(ChosenOutputs, MistakesAreNamedWithTheirPlace) {
   EXPECT_THAT(error_of_options("outputs:\n  - delta\n  - x_gps"),
               HasSubstr("robot.yaml:3: outputs[1]: found 'x_gps', expected an output of the model 'tractor_trailer': "
                         "x_trailer_gps, "));
-  EXPECT_THAT(error_of_options("outputs: [delta, delta]"), HasSubstr("outputs[1]: this output is named twice"));
+  EXPECT_THAT(error_of_options("outputs: [delta, delta]"), HasSubstr("outputs[1]: 'delta' is named twice"));
+  EXPECT_THAT(error_of_options("outputs: [delta, {articulation: delta}]"), HasSubstr("is another output of the model"));
+  EXPECT_THAT(error_of_options("outputs: [delta, {1a: delta}]"), HasSubstr("expected letters"));
+  EXPECT_THAT(error_of_options("outputs: [delta, {a: delt}]"), HasSubstr("outputs[1].a"));
   EXPECT_THAT(error_of_options("outputs: []"), HasSubstr("expected 'all' or a list of outputs"));
   EXPECT_THAT(error_of_options("outputs: delta"), HasSubstr("expected 'all' or a list of outputs"));
   EXPECT_THROW(with_outputs(host().make_model("bicycle_slip"), {3}), Error);

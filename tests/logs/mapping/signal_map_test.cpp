@@ -62,6 +62,12 @@ TEST(SignalMap, MistakesNameTheirPlaceAndARemedy) {
   EXPECT_THAT(message_of("outputs: {psi_m: {from: [a, b], as: heading}}"), HasSubstr("x, y, z, w"));
   EXPECT_THAT(message_of("outputs: {x_gps: {from: a, derivative: true}}"), HasSubstr("is for inputs"));
   EXPECT_THAT(message_of("inputs: {v: {form: a}}"), HasSubstr("did you mean 'from'"));
+  EXPECT_THAT(message_of("outputs: {x_gps: {from: a, when: {of: b}}}"), HasSubstr("at_least: 2"));
+  EXPECT_THAT(message_of("outputs: {x_gps: {from: a, when: {of: b, at_least: 2, at_most: 1}}}"),
+              HasSubstr("at_least up to at_most"));
+  EXPECT_THAT(message_of("outputs: {x_gps: {from: a, when: {off: b}}}"), HasSubstr("did you mean 'of'"));
+  EXPECT_THAT(message_of("outputs:\n  x_gps: {from: /a:x, when: {of: '/b:y', at_most: 1}}"),
+              AllOf(HasSubstr("robot.yaml:2"), HasSubstr("'/b:y' is in other records"), HasSubstr("of /a")));
   EXPECT_THAT(message_of("origin: [1]"), HasSubstr("latitude, longitude and height"));
   EXPECT_THAT(message_of("origin: [100, 0, 0]"), HasSubstr("within 90 degrees"));
   EXPECT_THAT(message_of("inputs: {delta_rate: {from: [a, b], as: turn, unit: m/s}}"), HasSubstr("`track`"));

@@ -43,6 +43,36 @@ TEST_F(SignalStreamTest, RowsComeRecordByRecordOutputsFirst) {
   EXPECT_FALSE(stream.origin());
 }
 
+TEST_F(SignalStreamTest, AConditionLeavesValuesOut) {
+  const auto log =
+      open_csv(write("d.csv", "time,e,status,var,v\n1,10,2,0.01,5\n2,20,1,0.01,5\n3,30,2,4,5\n4,40,,0.01,5\n"));
+  SignalStream stream(*log, map("outputs: {psi_m: none, delta: none, y_gps: none, x_gps: {from: e, when: [{of: status, "
+                                "at_least: 2}, {of: var, at_most: 1}]}}\ninputs: {delta_rate: none}"));
+  std::vector<double> found;
+  log->read(stream.wanted(), [&](const Record& record) {
+    for (const SignalRow& row : stream.take(record))
+      if (row.is_output) found.push_back(row.values[0]);
+    return true;
+  });
+  EXPECT_EQ(found, (std::vector<double>{10.0}));
+  EXPECT_EQ(stream.missing(), 0);
+  for (const SignalCount& count : stream.counts()) EXPECT_EQ(count.left_out, count.is_output ? 3 : 0) << count.variable;
+}
+
+TEST_F(SignalStreamTest, ACounterpartTakesWhatAnotherLeavesOut) {
+  const auto log = open_csv(write("d.csv", "time,e,status,v\n1,10,2,5\n2,20,1,5\n3,30,2,5\n"));
+  SignalStream stream(*log,
+                      map("outputs: {psi_m: none, delta: none, x_gps: {from: e, when: {of: status, at_least: 2}}, "
+                          "y_gps: {from: e, when: {of: status, at_most: 1}}}\ninputs: {delta_rate: none}"));
+  std::vector<bool> is_first;
+  log->read(stream.wanted(), [&](const Record& record) {
+    for (const SignalRow& row : stream.take(record))
+      if (row.is_output) is_first.push_back(!std::isnan(row.values[0]) && std::isnan(row.values[1]));
+    return true;
+  });
+  EXPECT_EQ(is_first, (std::vector<bool>{true, false, true}));
+}
+
 TEST_F(SignalStreamTest, BegunAnewItForgetsWhatDerivativesHaveInHand) {
   const auto log = open_csv(write("d.csv", "time,delta\n10,0.1\n11,0.3\n1,0.5\n2,0.6\n"));
   for (const bool begins_anew : {false, true}) {

@@ -36,7 +36,15 @@ struct SignalOptions {
   double delay = 0.0;
   bool derivative = false;
   std::string clock;
+  Settings when;
   RHEC_EXPORT static const OptionTable<SignalOptions>& table();
+};
+
+/// What else a record has to say so that a signal of it counts: a fix by its status, or by its own covariance.
+struct SignalCondition {
+  SignalName of;
+  double at_least, at_most;
+  bool holds(double value) const noexcept { return value >= at_least && value <= at_most; }
 };
 
 /// The section `signals`.
@@ -55,8 +63,9 @@ struct MappedSignal {
   int index = 0;  ///< among the model's outputs or inputs
   SignalOptions options = {};
   std::vector<SignalName> from = {};
-  double factor = 1.0;    ///< sign, scale, unit and radius
-  bool is_angle = false;  ///< what is read is one: its differences are taken on the circle
+  std::vector<SignalCondition> conditions = {};  ///< on fields of the same records
+  double factor = 1.0;                           ///< sign, scale, unit and radius
+  bool is_angle = false;                         ///< what is read is one: its differences are taken on the circle
 };
 
 /// Which signals of a log are a model's outputs and inputs. A variable that the section does not name is the signal of

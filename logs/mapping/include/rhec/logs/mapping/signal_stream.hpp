@@ -19,6 +19,7 @@ struct SignalCount {
   std::string variable, source;
   bool is_output = false;
   std::int64_t values = 0, missing = 0;
+  std::int64_t left_out = 0;  ///< by a condition (`when`)
 };
 
 /// Outputs or inputs that were measured together.
