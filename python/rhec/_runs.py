@@ -8,7 +8,7 @@ import os
 import pathlib
 import tempfile
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, overload
 
 from . import _configuration, _rhec
 from ._arguments import check_range, checked
@@ -198,6 +198,12 @@ def _drive(function, scenario, log, variants, hold_out, phase, changes, plugin_p
         return DriveEstimates(function(folders, settings, asked, bar))
 
 
+@overload
+def estimate(scenario: Configuration, log: DriveLog, gps: None = None, *, variants: Sequence[str] = ..., hold_out: int | None = ...,
+             phase: int | None = ..., set: Changes = ..., plugin_path: PluginPath = ..., progress: Progress = ...) -> DriveEstimates: ...
+@overload
+def estimate(scenario: Configuration, log: LogPart, gps: LogPart, *, variants: Sequence[str] = ..., hold_out: int | None = ...,
+             phase: int | None = ..., set: Changes = ..., plugin_path: PluginPath = ..., progress: Progress = ...) -> Estimates: ...
 @checked
 def estimate(scenario: Configuration, log: DriveLog, gps: LogPart | None = None, *, variants: Sequence[str] = (),
              hold_out: int | None = None, phase: int | None = None, set: Changes = None, plugin_path: PluginPath = (),
@@ -219,6 +225,15 @@ def estimate(scenario: Configuration, log: DriveLog, gps: LogPart | None = None,
     return _drive(_rhec.estimate_drive, scenario, log, variants, hold_out, phase, set, plugin_path, progress, "estimate")
 
 
+@overload
+def smooth(scenario: Configuration, log: None = None, gps: None = None, *, variants: Sequence[str] = ..., hold_out: int | None = ...,
+           phase: int | None = ..., set: Changes = ..., plugin_path: PluginPath = ..., progress: Progress = ...) -> SmoothedRun: ...
+@overload
+def smooth(scenario: Configuration, log: DriveLog, gps: None = None, *, variants: Sequence[str] = ..., hold_out: int | None = ...,
+           phase: int | None = ..., set: Changes = ..., plugin_path: PluginPath = ..., progress: Progress = ...) -> DriveEstimates: ...
+@overload
+def smooth(scenario: Configuration, log: LogPart, gps: LogPart, *, variants: Sequence[str] = ..., hold_out: int | None = ...,
+           phase: int | None = ..., set: Changes = ..., plugin_path: PluginPath = ..., progress: Progress = ...) -> Estimates: ...
 @checked
 def smooth(scenario: Configuration, log: DriveLog | None = None, gps: LogPart | None = None, *, variants: Sequence[str] = (),
            hold_out: int | None = None, phase: int | None = None, set: Changes = None, plugin_path: PluginPath = (),
