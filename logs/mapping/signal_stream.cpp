@@ -138,7 +138,10 @@ void SignalStream::read(const Record& record, Reading& reading) {
   for (const Reading::Use& use : reading.uses) {
     Channel& channel = channels_[use.channel];
     if (!reading.counts_for(use.channel)) {
-      channel.count.left_out += use.field == 0;
+      if (use.field == 0) {
+        ++channel.count.left_out;
+        ++left_out_;
+      }
       continue;
     }
     // Wheels may come one by one, each in a message of its own: what a message lacks is waited for.

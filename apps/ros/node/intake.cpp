@@ -26,7 +26,7 @@ bool begins_with_header(const std::string& type) {
 }  // namespace
 
 const char* name_of(Refusal refusal) noexcept {
-  constexpr std::array names{"too large", "broken", "stamp", "frame", "fix", "number"};
+  constexpr std::array names{"too large", "broken", "stamp", "frame", "fix", "number", "left out"};
   static_assert(names.size() == refusal_count);
   return names[static_cast<std::size_t>(refusal)];
 }
@@ -67,12 +67,16 @@ std::span<const logs::SignalRow> Intake::take(int topic, std::span<const std::by
       refuse(topic, *refusal, found_);
       return rows_;
     }
-    const std::int64_t missing = stream_.missing();
+    const std::int64_t missing = stream_.missing(), left_out = stream_.left_out();
     const std::span<const logs::SignalRow> rows = stream_.take({.topic = topic, .received = now, .bytes = message});
     // Joints may come in several messages: what one of them lacks is no fault, unless it has nothing.
     const bool is_void = rows.empty() && stream_.missing() > missing;
     if (is_void || !std::ranges::all_of(rows, [this](const auto& row) { return is_possible(row); })) {
       refuse(topic, Refusal::number, "a value was missing, not finite or beyond its bounds");
+      return rows_;
+    }
+    if (rows.empty() && stream_.left_out() > left_out) {
+      refuse(topic, Refusal::left_out, "a condition on its signals (signals.SIGNAL.when) does not hold");
       return rows_;
     }
     ++counts_[static_cast<std::size_t>(topic)].used;

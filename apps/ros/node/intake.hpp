@@ -17,13 +17,14 @@ namespace rhec::apps::ros {
 /// Why a message is not used.
 enum class Refusal : std::uint8_t {
   too_large,
-  broken,  ///< it is no message of its type
-  stamp,   ///< too old, or from the future
-  frame,   ///< another frame than before
-  fix,     ///< a receiver without a fix, or one that states a large error
-  number   ///< a value that is missing, not finite or beyond its bounds
+  broken,   ///< it is no message of its type
+  stamp,    ///< too old, or from the future
+  frame,    ///< another frame than before
+  fix,      ///< a receiver without a fix, or one that states a large error
+  number,   ///< a value that is missing, not finite or beyond its bounds
+  left_out  ///< by a condition: `signals.SIGNAL.when`
 };
-inline constexpr std::size_t refusal_count = 6;
+inline constexpr std::size_t refusal_count = 7;
 const char* name_of(Refusal refusal) noexcept;
 
 /// What came on one topic.

@@ -75,6 +75,32 @@ TEST_F(IntakeTest, GoodMessagesBecomeRows) {
   EXPECT_EQ(intake_.measured(), (std::vector<bool>{true, true, true}));
 }
 
+TEST_F(IntakeTest, ConditionsLeaveMessagesOut) {
+  const Settings good = parse_yaml(R"(
+outputs:
+  x: {from: /fix, as: east, when: {of: "/fix:status.status", at_least: 2}}
+  y: {from: /fix, as: north, when: {of: "/fix:status.status", at_least: 2}}
+  angle: none
+inputs: {speed: "/joint_states:velocity[wheel]"}
+)",
+                                   "test");
+  const LiveTopics topics(good, Settings(), {});
+  Intake intake(topics, logs::SignalMap(good, vehicle()), vehicle(), {.behind = 2.0, .ahead = 0.2});
+  const auto rows_of = [&](int status) {
+    MessageWriter writer(topics.message_type(topics.topic("/fix")));
+    writer.set("latitude", 51.0);
+    writer.set("longitude", 7.0);
+    writer.set("status.status", status);
+    return intake.take(topics.topic("/fix"), writer.write(now, "gps"), now).size();
+  };
+  EXPECT_EQ(rows_of(2), 1u);
+  EXPECT_EQ(rows_of(1), 0u);
+  const TopicCount& count = intake.counts()[static_cast<std::size_t>(topics.topic("/fix"))];
+  EXPECT_EQ(count.used, 1);
+  EXPECT_EQ(count.refused[static_cast<std::size_t>(Refusal::left_out)], 1);
+  EXPECT_NE(count.last.find("signals.SIGNAL.when"), std::string::npos);
+}
+
 TEST_F(IntakeTest, StampsThatCannotBeAreRefused) {
   EXPECT_EQ(fix(51.0, 0, 0.0, 0, now - 3 * second), 0u);
   EXPECT_EQ(fix(51.0, 0, 0.0, 0, now + second), 0u);

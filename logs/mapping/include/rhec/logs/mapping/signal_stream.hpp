@@ -52,6 +52,8 @@ class RHEC_EXPORT SignalStream {
   std::vector<SignalCount> counts() const;
   /// Values that were missing in records, of all signals.
   std::int64_t missing() const noexcept { return missing_; }
+  /// Values that a condition left out, of all signals.
+  std::int64_t left_out() const noexcept { return left_out_; }
   /// Of the local plane: as configured, or the first good fix; none: there was none.
   std::optional<GeodeticPoint> origin() const;
   /// By topic and clock, the least time from a stamp to its arrival [s]; infinite where nothing came.
@@ -74,7 +76,7 @@ class RHEC_EXPORT SignalStream {
   std::vector<Channel> channels_;
   std::vector<Reading> readings_;
   std::vector<bool> wanted_;
-  std::int64_t missing_ = 0;
+  std::int64_t missing_ = 0, left_out_ = 0;
   std::optional<LocalPlane> plane_;
   std::map<std::pair<bool, Stamp>, std::vector<double>> values_;  ///< of the reading at hand: by kind and stamp
   std::vector<SignalRow> rows_;
