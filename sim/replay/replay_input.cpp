@@ -1,6 +1,7 @@
 #include "rhec/sim/replay/replay_input.hpp"
 
 #include <algorithm>
+#include <optional>
 #include <utility>
 
 namespace rhec::sim {
@@ -11,6 +12,24 @@ std::function<void(double)> part_of(const LoopHooks& hooks, int part, int parts)
   if (!hooks.progress) return {};
   return [shown = hooks.progress, part, parts](double share) { shown((part + share) / parts); };
 }
+
+/// The two replays of a variant: with all measurements, and, if some are withheld, without those.
+struct Parts {
+  Parts(const ReplayInput& input, std::size_t variant, const LoopHooks& hooks)
+      : asked(input.scenario.variants()[variant]),
+        drive(input.drives[variant]),
+        start(input.scenario.simulated_start()),
+        first(hooks) {
+    const int parts = input.hold_out.every > 0 ? 2 : 1;
+    first.progress = part_of(hooks, 0, parts);
+    if (parts > 1) second = LoopHooks{.progress = part_of(hooks, 1, parts)};
+  }
+  const ReplayVariant& asked;
+  const logs::Drive& drive;
+  const std::optional<Eigen::VectorXd>& start;
+  LoopHooks first;
+  std::optional<LoopHooks> second;
+};
 
 }  // namespace
 
@@ -28,33 +47,25 @@ std::int64_t ReplayInput::estimates(std::size_t variant) const {
 
 DriveResult estimate_variant(const ReplayInput& input, std::size_t variant, const LoopHooks& hooks,
                              std::shared_ptr<const RobotHooks> withheld_robot) {
-  const ReplayVariant& asked = input.scenario.variants()[variant];
-  const logs::Drive& drive = input.drives[variant];
-  const int parts = input.hold_out.every > 0 ? 2 : 1;
-  LoopHooks first = hooks;
-  first.progress = part_of(hooks, 0, parts);
+  const Parts of(input, variant, hooks);
   DriveResult result;
-  result.all = replay_drive(asked.robot, drive, {}, input.scenario.simulated_start(), first);
-  result.all.name = asked.name;
+  result.all = replay_drive(of.asked.robot, of.drive, {}, of.start, of.first);
+  result.all.name = of.asked.name;
   // Accuracy is that of a replay of its own: the estimates have all measurements.
-  if (parts > 1)
-    result.withheld = replay_drive(asked.robot, drive, input.hold_out, input.scenario.simulated_start(),
-                                   {.progress = part_of(hooks, 1, parts), .robot = std::move(withheld_robot)});
+  if (!of.second) return result;
+  LoopHooks second = *of.second;
+  second.robot = std::move(withheld_robot);
+  result.withheld = replay_drive(of.asked.robot, of.drive, input.hold_out, of.start, second);
   return result;
 }
 
 SmoothedVariant smooth_variant(const ReplayInput& input, std::size_t variant, const LoopHooks& hooks) {
-  const ReplayVariant& asked = input.scenario.variants()[variant];
-  const logs::Drive& drive = input.drives[variant];
-  const int parts = input.hold_out.every > 0 ? 2 : 1;
-  LoopHooks first = hooks;
-  first.progress = part_of(hooks, 0, parts);
+  const Parts of(input, variant, hooks);
   SmoothedVariant result;
-  result.all = smooth_drive(asked.name, asked.robot, drive, {}, input.scenario.simulated_start(), first);
-  if (parts > 1)
-    result.withheld = smooth_drive(asked.name, asked.robot, drive, input.hold_out, input.scenario.simulated_start(),
-                                   {.progress = part_of(hooks, 1, parts)})
-                          .smoothed;
+  result.all = smooth_drive(of.asked.name, of.asked.robot, of.drive, {}, of.start, of.first);
+  if (of.second)
+    result.withheld =
+        smooth_drive(of.asked.name, of.asked.robot, of.drive, input.hold_out, of.start, *of.second).smoothed;
   return result;
 }
 

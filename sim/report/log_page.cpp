@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "rhec/core/base/error.hpp"
 
@@ -23,6 +24,21 @@ LogPage::LogPage(const fs::path& folder, const Json& summary)
   if (fs::exists(folder / "horizons.jsonl")) horizons_ = read_horizons(folder / "horizons.jsonl", log_maker, "log");
   if (fs::exists(folder / "times.csv")) times_.emplace(folder / "times.csv", log_maker);
   notes_ = Json::array();
+}
+
+Json LogPage::document() {
+  describe();
+  fixes();
+  inputs();
+  document_["variants"] = Json::array();
+  for (std::size_t v = 0; v < variants_.size(); ++v) document_["variants"].push_back(variant(v));
+  add_note(notes_, "truth",
+           "Nobody knows what the vehicle and the ground really did, so there are no errors of states and slip; what "
+           "was withheld is what predictions can be held against.");
+  add_note(notes_, "inputs", "Nothing was controlled: inputs are those that were measured, and there are no plans.");
+  if (!words_.empty()) add_note(notes_, "samples", words_);
+  document_["notes"] = std::move(notes_);
+  return std::move(document_);
 }
 
 void LogPage::require_same_log(const std::vector<std::size_t>& nodes) const {

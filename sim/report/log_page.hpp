@@ -16,8 +16,15 @@ namespace rhec::sim {
 class LogPage {
  public:
   LogPage(const std::filesystem::path& folder, const Json& summary);
+  virtual ~LogPage() = default;
+  LogPage(const LogPage&) = delete;
+  LogPage& operator=(const LogPage&) = delete;
+  Json document();
 
  protected:
+  /// Positions as they were measured, and the gaps between them.
+  virtual void fixes() = 0;
+  virtual Json variant(std::size_t index) = 0;
   /// The rows of one variant in estimates.csv.
   struct Range {
     std::int64_t first = 0, end = 0;
@@ -26,9 +33,6 @@ class LogPage {
   void require_same_log(const std::vector<std::size_t>& nodes) const;
   /// Throws Error for a row of a variant that summary.json does not have, or without any variant.
   void require_all_rows(std::int64_t row) const;
-  void describe();
-  /// Their measured values on each interval, at its start; the same for all variants with recorded windows.
-  void inputs();
   void gaps_between(const std::vector<double>& times);
   std::vector<double> column(std::string_view name, const std::vector<std::int64_t>& rows) const;
   static Json flags(const std::vector<double>& values, const std::vector<std::size_t>& rows);
@@ -54,6 +58,9 @@ class LogPage {
   std::string words_;
 
  private:
+  void describe();
+  /// Their measured values on each interval, at its start; the same for all variants with recorded windows.
+  void inputs();
   Json series(const std::string& variant, const std::string& name, const std::vector<std::int64_t>& rows,
               const std::vector<double>& times);
   void track(Json& about, const std::string& name, const std::vector<std::int64_t>& rows,

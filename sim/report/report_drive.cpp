@@ -14,7 +14,7 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Of a log with the vehicle's own sensors.
-class DriveReport : LogPage {
+class DriveReport final : public LogPage {
  public:
   DriveReport(const fs::path& folder, const Json& summary)
       : LogPage(folder, summary),
@@ -27,21 +27,6 @@ class DriveReport : LogPage {
     for (std::size_t i = first; i < table_.header().size() && !table_.header()[i].starts_with("sigma_"); ++i)
       names_.push_back(table_.header()[i]);
     states_ = horizons_ ? horizons_->head.at("model").at("states").size() : names_.size();
-  }
-
-  Json document() {
-    describe();
-    fixes();
-    inputs();
-    document_["variants"] = Json::array();
-    for (std::size_t v = 0; v < variants_.size(); ++v) document_["variants"].push_back(variant(v));
-    add_note(notes_, "truth",
-             "Nobody knows what the vehicle and the ground really did, so there are no errors of states and slip; "
-             "withheld measurements are what predictions can be held against.");
-    add_note(notes_, "inputs", "Nothing was controlled: inputs are those that were measured, and there are no plans.");
-    if (!words_.empty()) add_note(notes_, "samples", words_);
-    document_["notes"] = std::move(notes_);
-    return std::move(document_);
   }
 
  private:
@@ -67,7 +52,7 @@ class DriveReport : LogPage {
   }
 
   /// Positions as they were measured; null where nothing measures them.
-  void fixes() {
+  void fixes() override {
     document_["fixes"] = nullptr;
     document_["gaps"] = Json::array();
     const Json positions = horizons_ ? horizons_->head.at("model").at("position_outputs") : Json();
@@ -98,7 +83,7 @@ class DriveReport : LogPage {
     gaps_between(times);
   }
 
-  Json variant(std::size_t index) {
+  Json variant(std::size_t index) override {
     const auto& [name, range] = variants_[index];
     std::vector<std::int64_t> rows;
     for (std::int64_t row = range.first; row < range.end; ++row) rows.push_back(row);

@@ -12,7 +12,7 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Of dead reckoning and fixes.
-class LogReport : LogPage {
+class LogReport final : public LogPage {
  public:
   LogReport(const fs::path& folder, const Json& summary) : LogPage(folder, summary) {
     find_variants();
@@ -21,21 +21,6 @@ class LogReport : LogPage {
       nodes.push_back(summary_.at("variants").at(name).at("nodes").get<std::size_t>());
     require_same_log(nodes);
     read_names();
-  }
-
-  Json document() {
-    describe();
-    fixes();
-    inputs();
-    document_["variants"] = Json::array();
-    for (std::size_t v = 0; v < variants_.size(); ++v) document_["variants"].push_back(variant(v));
-    add_note(notes_, "truth",
-             "Nobody knows what the vehicle and the ground really did, so there are no errors of states and "
-             "slip; withheld fixes are what predictions can be held against.");
-    add_note(notes_, "inputs", "Nothing was controlled: inputs are those that were measured, and there are no plans.");
-    if (!words_.empty()) add_note(notes_, "samples", words_);
-    document_["notes"] = std::move(notes_);
-    return std::move(document_);
   }
 
  private:
@@ -82,7 +67,7 @@ class LogReport : LogPage {
     return rows_of(range, [&](std::int64_t row) { return table_.text(row, kind) == "fix"; });
   }
 
-  void fixes() {
+  void fixes() override {
     const std::vector<std::int64_t> rows = fixes_of(variants_.front().second);
     const std::vector<double> times = column("time", rows), x = column("fix_x", rows), y = column("fix_y", rows),
                               held_out = column("held_out", rows);
@@ -101,7 +86,7 @@ class LogReport : LogPage {
     gaps_between(times);
   }
 
-  Json variant(std::size_t index) {
+  Json variant(std::size_t index) override {
     const auto& [name, range] = variants_[index];
     const std::size_t held_out = table_.column("held_out");
     const std::vector<std::int64_t> rows =
