@@ -14,6 +14,8 @@
 namespace rhec::logs {
 namespace {
 
+constexpr const char* fix_type = "sensor_msgs/msg/NavSatFix";
+
 /// A signal that could be meant, and how likely that is.
 struct Candidate {
   std::string entry;  ///< in YAML
@@ -139,7 +141,7 @@ class Proposer {
   void by_type(const TopicSurvey& topic, Quantity quantity) {
     const std::string& type = topic.topic.type;
     const std::string& name = topic.topic.name;
-    const bool is_gnss = type == "sensor_msgs/msg/NavSatFix";
+    const bool is_gnss = type == fix_type;
     const bool is_odometry = type == "nav_msgs/msg/Odometry";
     const bool is_of_gps = has_any(lower(name), {"gps", "gnss", "rtk"});
     if (is_gnss && quantity == Quantity::x) add(fmt::format("{{from: {}, as: east}}", name), 4.0);
@@ -207,12 +209,25 @@ void append_section(const char* name, const std::vector<Variable>& variables, bo
   }
 }
 
+/// What to do where a receiver's fixes are now better, now worse.
+void append_grades(const TopicSurvey& fixes, std::string& text) {
+  const auto status = std::ranges::find(fixes.fields, "status.status", &FieldSurvey::name);
+  if (status == fixes.fields.end() || status->count == 0 || std::max(status->least, 0.0) >= status->most) return;
+  text += fmt::format(
+      "    # The status of {0} is {1:g} to {2:g}. Worse fixes can be left out, by\n"
+      "    #   when: {{of: \"{0}:status.status\", at_least: {2:g}}}\n"
+      "    # or be another sensor with noise of its own: docs/sensors.md\n",
+      fixes.topic.name, status->least, status->most);
+}
+
 }  // namespace
 
 std::string propose_signals(const Survey& survey, const ModelDescription& about) {
   Proposer proposer(survey);
   std::string text = "signals:\n";
   append_section("outputs", about.outputs, true, proposer, text);
+  for (const TopicSurvey& topic : survey.topics)
+    if (topic.topic.type == fix_type) append_grades(topic, text);
   append_section("inputs", about.inputs, false, proposer, text);
   return text;
 }

@@ -45,6 +45,19 @@ TEST(Proposal, FindsWhatRobotsOfRosSay) {
   EXPECT_THAT(proposal, testing::HasSubstr("derivative: true"));
 }
 
+TEST(Proposal, TellsOfFixesThatAreNowBetterNowWorse) {
+  Survey survey;
+  survey.topics = {topic("/fix", "sensor_msgs/msg/NavSatFix", {"latitude", "longitude", "altitude", "status.status"})};
+  FieldSurvey& status = survey.topics[0].fields[3];
+  status.least = -1.0;
+  status.most = 2.0;
+  const std::string proposal = propose_signals(survey, described());
+  EXPECT_THAT(proposal, testing::HasSubstr("when: {of: \"/fix:status.status\", at_least: 2}"));
+  EXPECT_EQ(from(proposal, "x_gps"), "/fix:");
+  status.most = 0.0;  // fixes and none
+  EXPECT_THAT(propose_signals(survey, described()), testing::Not(testing::HasSubstr("when:")));
+}
+
 TEST(Proposal, FindsColumnsByTheirNames) {
   Survey survey;
   survey.topics = {topic("", "table", {"lat", "lon", "alt", "yaw", "steer_angle", "speed_kmh", "delta_rate"})};
