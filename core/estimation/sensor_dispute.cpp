@@ -154,6 +154,11 @@ bool SensorWatch::is_position_disputed() const noexcept {
   return false;
 }
 
+/// Whether nothing explains a position that is disputed, and no other sensor has said for as long where the vehicle is.
+bool SensorWatch::is_place_lost() const noexcept {
+  return std::min(disputed_samples_, unplaced_samples_) > Memory::hopeless * setup_.proof && is_position_disputed();
+}
+
 bool SensorWatch::sees_position(const std::vector<int>& outputs) const noexcept {
   return std::ranges::any_of(outputs, [&](int j) { return sees_position(j); });
 }
@@ -164,17 +169,21 @@ bool SensorWatch::sees_position(int output) const noexcept {
          (roles.position_y >= 0 && own_->filter.depends_on(output, roles.position_y));
 }
 
+/// Whether a sensor that is not disputed has said where the vehicle is, and has not been silent for long since.
+bool SensorWatch::is_placed_otherwise() const noexcept {
+  return unplaced_samples_ < std::min(disputed_samples_, setup_.proof);
+}
+
 /// A disputed position can be followed only if nothing else says where the vehicle is.
 bool SensorWatch::may_follow() const noexcept {
-  bool is_any_undisputed = false;
+  if (is_placed_otherwise()) return false;
+  if (is_position_disputed()) return true;
   for (std::size_t s = 0; s < sensors_.size(); ++s) {
-    const std::vector<int>& outputs = sensors_[s].outputs;
-    if ((findings_[s] & reason::rejected) || std::ranges::all_of(outputs, [&](int j) { return std::isnan(raw_[j]); }))
-      continue;
-    if (sees_position(outputs)) return false;
-    is_any_undisputed = true;
+    const bool is_disputed = (findings_[s] & reason::rejected) != 0;
+    if (!is_disputed && std::ranges::any_of(sensors_[s].outputs, [&](int j) { return !std::isnan(raw_[j]); }))
+      return false;
   }
-  return is_position_disputed() || !is_any_undisputed;
+  return true;
 }
 
 /// The log likelihood of slip that has jumped just now; NaN if it has not.
@@ -249,7 +258,7 @@ SensorWatch::Finding SensorWatch::settle(double time, const double* outputs) noe
     for (Record& record : records_) record = {};
     return accept(*moved_);
   }
-  if (memory_->search && disputed_samples_ > Memory::hopeless * setup_.proof && is_position_disputed()) {
+  if (memory_->search && is_place_lost()) {
     // Nothing explains what is measured: the position counts, and all else is found anew.
     start_moved();
     moved_->filter.update(raw_.data());
@@ -338,7 +347,7 @@ void SensorWatch::hold_back(double time, const double* outputs) noexcept {
 void SensorWatch::end_dispute() noexcept {
   is_disputed_ = false;
   slip_probability_ = 0.0;
-  disputed_samples_ = 0;
+  disputed_samples_ = unplaced_samples_ = 0;
   if (memory_->second_thought) memory_->second_thought->cancel();
   for (Hypothesis* each : {slip_.get(), edge_.get(), moved_.get(), blind_.get()}) {
     each->is_active = each->is_informed = false;

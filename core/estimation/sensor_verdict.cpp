@@ -127,8 +127,7 @@ void SensorWatch::assess(const Estimate& estimate, std::span<const Presence> pre
       has_finding = true;
     }
   }
-  is_lost =
-      is_lost || is_searching() || (disputed_samples_ > Memory::hopeless * setup_.proof && is_position_disputed());
+  is_lost = is_lost || is_searching() || is_place_lost();
   health.level = is_lost ? HealthLevel::lost : has_finding ? HealthLevel::degraded : HealthLevel::ok;
 }
 

@@ -217,7 +217,7 @@ SensorWatch::Finding SensorWatch::judge(double time, double* outputs) noexcept {
     filter.expect();
     find_stuck(outputs);
     std::copy_n(outputs, raw_.size(), raw_.data());
-    bool is_disputed = false, is_any_measured = false;
+    bool is_disputed = false, is_any_measured = false, is_placed = false;
     for (std::size_t s = 0; s < sensors_.size(); ++s) {
       const bool has_room = innovation_count_ < static_cast<int>(innovations_.size());
       Innovation& innovation = has_room ? innovations_[innovation_count_] : scratch_;
@@ -230,6 +230,7 @@ SensorWatch::Finding SensorWatch::judge(double time, double* outputs) noexcept {
       heard_[s] = time;
       if (innovation.accepted) {
         ++states_[s].accepted;
+        is_placed = is_placed || sees_position(sensors_[s].outputs);
         continue;
       }
       is_disputed = true;
@@ -238,6 +239,7 @@ SensorWatch::Finding SensorWatch::judge(double time, double* outputs) noexcept {
       for (const int j : sensors_[s].outputs) outputs[j] = Memory::unknown;
     }
     if (is_blind_) test_inputs(raw_.data());
+    unplaced_samples_ = is_placed ? 0 : unplaced_samples_ + is_disputed;
     if (is_disputed) {
       finding = settle(time, outputs);
     } else if (is_disputed_ && std::ranges::any_of(records_, [](const Record& each) { return each.failures > 0; })) {

@@ -13,8 +13,8 @@
 
 namespace rhec::testing {
 
-inline Robot watched_robot(const std::string& estimator, const std::string& more = "") {
-  return {host(), RobotOptions::table().parse(parse_yaml(R"(
+inline Settings watched_settings(const std::string& estimator, const std::string& more) {
+  return parse_yaml(R"(
 step: 0.2
 model: {name: bicycle_slip, wheelbase: 1.4, gps_offset: 0.4}
 noise: {outputs: {x_gps: 0.03, y_gps: 0.03, delta: 0.01745}, inputs: {u1: 0.1, u2: 0.1}}
@@ -27,8 +27,20 @@ estimator:
     parameters: {kappa: 0.5, mu: 0.5}
     sigma: {x_pos: 0.05, y_pos: 0.05, beta: 0.03, delta: 0.02, kappa: 1, mu: 1}
 )" + more,
-                                                         "robot"),
-                                              "robot")};
+                    "robot");
+}
+
+inline Robot watched_robot(const std::string& estimator, const std::string& more = "") {
+  return {host(), RobotOptions::table().parse(watched_settings(estimator, more), "robot")};
+}
+
+/// The same with a second receiver, that of outputs 3 and 4, with ten times the noise of the first.
+inline Robot with_two_receivers(const std::string& estimator) {
+  Settings settings = watched_settings(estimator, "");
+  apply_assignment(settings, "model.outputs=[x_gps, y_gps, delta, {x_rough: x_gps}, {y_rough: y_gps}]");
+  for (const char* noise : {"noise.outputs.x_rough=0.3", "noise.outputs.y_rough=0.3"})
+    apply_assignment(settings, noise);
+  return {host(), RobotOptions::table().parse(settings, "robot")};
 }
 
 struct SensorFaults : ::testing::TestWithParam<const char*> {

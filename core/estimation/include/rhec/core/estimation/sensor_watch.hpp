@@ -158,7 +158,7 @@ class RHEC_EXPORT SensorWatch {
   void end_dispute() noexcept;
   bool sees_position(int output) const noexcept;
   bool sees_position(const std::vector<int>& outputs) const noexcept;
-  bool is_position_disputed() const noexcept;
+  bool is_position_disputed() const noexcept, is_place_lost() const noexcept, is_placed_otherwise() const noexcept;
   bool may_follow() const noexcept;
   void test_inputs(const double* outputs) noexcept;
   void remember(double time) noexcept;
@@ -178,7 +178,7 @@ class RHEC_EXPORT SensorWatch {
   std::unique_ptr<Memory> memory_;
   bool is_active_ = false, is_disputed_ = false, is_blind_ = false;
   double slip_probability_ = 0.0;  ///< that slip has jumped, while that is open
-  int disputed_samples_ = 0, trusted_samples_ = 0, calm_samples_ = 0;
+  int disputed_samples_ = 0, unplaced_samples_ = 0, trusted_samples_ = 0, calm_samples_ = 0;
   std::vector<SensorHealth> states_;  ///< by sensor
   SensorHealth inputs_;
   std::uint32_t input_findings_ = 0;
