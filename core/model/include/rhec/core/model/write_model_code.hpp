@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <string>
 #include <vector>
 
@@ -12,8 +13,12 @@
 
 namespace rhec {
 
-/// Writes a text aside and renames it, so that none is half-written. Throws Error with the file.
+/// Writes a text aside and renames it, so that none is half-written. A file that has this text is left alone, with its
+/// time, so that nothing is compiled anew. Throws Error with the file.
 inline void write_text(const std::filesystem::path& file, const std::string& text) {
+  std::ifstream in(file, std::ios::binary);
+  if (in && std::string(std::istreambuf_iterator<char>(in), {}) == text) return;
+  in.close();
   const std::filesystem::path aside = file.string() + ".new";
   std::ofstream out(aside, std::ios::binary);
   out << text;
