@@ -38,6 +38,12 @@ std::vector<Value> read_each(const Settings& list, std::string_view expected, Re
 
 }  // namespace
 
+Settings::Settings(const Settings&) = default;
+Settings::Settings(Settings&&) noexcept = default;
+Settings& Settings::operator=(const Settings&) = default;
+Settings& Settings::operator=(Settings&&) noexcept = default;
+Settings::~Settings() = default;
+
 Settings Settings::null(Origin origin) {
   Settings node;
   node.origin_ = std::move(origin);

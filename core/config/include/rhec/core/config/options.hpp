@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "rhec/core/config/option_entries.hpp"
 #include "rhec/core/config/option_values.hpp"
 
 namespace rhec {
@@ -50,7 +51,18 @@ class OptionTable {
   template <class Enum>
   OptionTable& choice(std::string name, Enum T::*member,
                       std::vector<std::pair<std::string, std::type_identity_t<Enum>>> choices, std::string meaning) {
-    return leaf(std::move(name), member, ChoiceValue<Enum>{std::move(choices)}, std::move(meaning));
+    if constexpr (!std::is_enum_v<Enum>) {
+      return leaf(std::move(name), member, ChoiceValue<Enum>{std::move(choices)}, std::move(meaning));
+    } else {
+      std::vector<std::pair<std::string, long long>> numbered;
+      for (auto& [called, value] : choices) numbered.emplace_back(std::move(called), static_cast<long long>(value));
+      return entry(
+          std::move(name), member,
+          choice_kind(
+              std::move(numbered), [](const void* of) { return static_cast<long long>(*static_cast<const Enum*>(of)); },
+              [](void* of, long long number) { *static_cast<Enum*>(of) = static_cast<Enum>(number); }),
+          std::move(meaning));
+    }
   }
   /// `none` or an empty value means 'no value'.
   OptionTable& optional_number(std::string name, std::optional<double> T::*member, std::string meaning,
@@ -82,30 +94,17 @@ class OptionTable {
   /// The same for a subtree with a known structure: `details` are its rows, named "name.detail", or "name" if a detail
   /// has no name.
   OptionTable& map(std::string name, Settings T::*member, std::vector<OptionRow> details) {
-    return entry({std::move(name), [=](T& into, const Settings& from, std::string_view) { into.*member = from; },
-                  [details = std::move(details)](const T&, const std::string& full_name, std::vector<OptionRow>& rows) {
-                    for (const OptionRow& detail : details) {
-                      rows.push_back(detail);
-                      rows.back().name = detail.name.empty() ? full_name : full_name + "." + detail.name;
-                    }
-                  }});
+    return entry(std::move(name), member, map_kind(std::move(details)), {});
   }
   /// A nested struct with its own table; its options become rows "name.option".
   template <class Group>
   OptionTable& group(std::string name, Group T::*member, OptionTable<Group> table) {
-    auto shared = std::make_shared<const OptionTable<Group>>(std::move(table));
-    return entry({std::move(name),
-                  [=](T& into, const Settings& from, std::string_view context) {
-                    shared->parse_into(into.*member, from, context);
-                  },
-                  [=](const T& defaults, const std::string& prefix, std::vector<OptionRow>& rows) {
-                    shared->describe(defaults.*member, prefix + ".", rows);
-                  }});
+    return entry(std::move(name), member, group_kind(std::move(table.entries_)), {});
   }
 
   /// An option that had another name once. The old name is refused with an error that gives the new one.
   OptionTable& renamed(std::string old_name, std::string new_name) {
-    renamed_.emplace_back(std::move(old_name), std::move(new_name));
+    entries_.add_renamed(std::move(old_name), std::move(new_name));
     return *this;
   }
 
@@ -121,11 +120,7 @@ class OptionTable {
   /// The same, starting from the values in `into`.
   void parse_into(T& into, const Settings& from, std::string_view context,
                   std::initializer_list<std::string_view> skip = {}) const {
-    check_old_names(from, renamed_, context);
-    check_keys(from, names_, context, skip);
-    for (const Entry& option : entries_) {
-      if (const Settings* value = from.find(option.name)) option.read(into, *value, context);
-    }
+    entries_.read(&into, from, context, skip);
   }
 
   /// One row per option, in the order of the table.
@@ -137,38 +132,35 @@ class OptionTable {
 
   /// Appends the rows, with the default values in `defaults`.
   void describe(const T& defaults, const std::string& prefix, std::vector<OptionRow>& rows) const {
-    for (const Entry& option : entries_) option.describe(defaults, prefix + option.name, rows);
+    entries_.describe(&defaults, prefix, rows);
   }
 
  private:
-  struct Entry {
-    std::string name;
-    std::function<void(T&, const Settings&, std::string_view context)> read;
-    std::function<void(const T&, const std::string& full_name, std::vector<OptionRow>&)> describe;
-  };
+  template <class>
+  friend class OptionTable;
 
   template <class Member, class Value>
   OptionTable& leaf(std::string name, Member member, Value value, std::string meaning) {
-    auto read = [=](T& into, const Settings& from, std::string_view context) {
-      std::invoke(member, into) = value.read(from, OptionContext{context, meaning});
-    };
-    auto describe = [=](const T& defaults, const std::string& full_name, std::vector<OptionRow>& rows) {
-      rows.push_back(
-          {full_name, value.type(), value.print(std::invoke(member, defaults)), value.constraint(), meaning});
-    };
-    return entry({std::move(name), std::move(read), std::move(describe)});
+    using Target = std::remove_cvref_t<std::invoke_result_t<const Member&, T&>>;
+    using Result = decltype(value.read(std::declval<const Settings&>(), std::declval<const OptionContext&>()));
+    std::shared_ptr<const OptionKind> kind;
+    if constexpr (std::is_same_v<Target, Result> && requires { usual_kind(value); })
+      kind = usual_kind(std::move(value));
+    else
+      kind = std::make_shared<const KindOf<Value, Target>>(std::move(value));
+    return entry(std::move(name), member, std::move(kind), std::move(meaning));
   }
 
-  OptionTable& entry(Entry option) {
-    check_new_name(option.name, names_);
-    names_.push_back(option.name);
-    entries_.push_back(std::move(option));
+  template <class Member>
+  OptionTable& entry(std::string name, Member member, std::shared_ptr<const OptionKind> kind, std::string meaning) {
+    entries_.add(
+        std::move(name), std::move(meaning),
+        [member](void* object) -> void* { return std::addressof(std::invoke(member, *static_cast<T*>(object))); },
+        std::move(kind));
     return *this;
   }
 
-  std::vector<std::string> names_;
-  std::vector<std::pair<std::string, std::string>> renamed_;  ///< old and new names
-  std::vector<Entry> entries_;
+  OptionEntries entries_;
 };
 
 }  // namespace rhec

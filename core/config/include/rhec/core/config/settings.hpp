@@ -28,6 +28,12 @@ class RHEC_EXPORT Settings {
   using Member = std::pair<std::string, Settings>;
 
   Settings() = default;  ///< null
+  // Trees are copied in many places: compiled once, and not for each.
+  Settings(const Settings&);
+  Settings(Settings&&) noexcept;
+  Settings& operator=(const Settings&);
+  Settings& operator=(Settings&&) noexcept;
+  ~Settings();
   static Settings null(Origin origin = {});
   static Settings scalar(std::string text, Origin origin = {});
   static Settings list(Origin origin = {});
