@@ -45,7 +45,7 @@ void print_nodes(const sim::TracedPart& part) {
 }
 
 /// The first few of a list, and how many more there are.
-std::string some_of(const std::vector<std::string>& texts) {
+std::string some_results(const std::vector<std::string>& texts) {
   constexpr std::size_t few = 8;
   const std::size_t shown = std::min(few, texts.size());
   const auto text =
@@ -62,7 +62,7 @@ void print_first(const sim::NotFinite& first) {
     fmt::print("    where n{}{} = {} = {}\n", operand.node, operand.name.empty() ? "" : " (" + operand.name + ")",
                operand.term, text_of(operand.value));
   fmt::print("    results that are not finite: {}\n",
-             first.results.empty() ? "none; nothing that is used depends on it" : some_of(first.results));
+             first.results.empty() ? "none; nothing that is used depends on it" : some_results(first.results));
   if (!first.advice.empty()) fmt::print("    -> {}\n", first.advice);
 }
 

@@ -46,15 +46,15 @@ if(RHEC_SANITIZE_THREADS)
   target_link_options(rhec_flags INTERFACE -fsanitize=thread)
 endif()
 
-# What Eigen would compile anew for most sources. Those with precompiled headers know that it is here.
+# What Eigen and fmt would compile anew for most sources. Those with precompiled headers know that it is here.
 if(RHEC_PRECOMPILE)
-  add_library(rhec_eigen STATIC "${CMAKE_CURRENT_LIST_DIR}/eigen/compiled_once.cpp")
-  target_compile_features(rhec_eigen PRIVATE cxx_std_20)
+  add_library(rhec_compiled_once STATIC "${CMAKE_CURRENT_LIST_DIR}/compiled_once/eigen.cpp" "${CMAKE_CURRENT_LIST_DIR}/compiled_once/fmt.cpp")
+  target_compile_features(rhec_compiled_once PRIVATE cxx_std_20)
   # Each function apart: a library takes those that it calls.
-  target_compile_options(rhec_eigen PRIVATE $<TARGET_PROPERTY:rhec_flags,INTERFACE_COMPILE_OPTIONS> -ffunction-sections)
-  target_link_options(rhec_eigen INTERFACE -Wl,--gc-sections)
-  target_link_libraries(rhec_eigen PRIVATE Eigen3::Eigen)
-  target_link_libraries(rhec_flags INTERFACE rhec_eigen)
+  target_compile_options(rhec_compiled_once PRIVATE $<TARGET_PROPERTY:rhec_flags,INTERFACE_COMPILE_OPTIONS> -ffunction-sections)
+  target_link_options(rhec_compiled_once INTERFACE -Wl,--gc-sections)
+  target_link_libraries(rhec_compiled_once PRIVATE Eigen3::Eigen fmt::fmt)
+  target_link_libraries(rhec_flags INTERFACE rhec_compiled_once)
 endif()
 
 # rhec_add_precompiled_headers(NAME): what most sources include, parsed once with the options of this folder. Those of its
@@ -82,7 +82,8 @@ endfunction()
 set(RHEC_COLD_OPTIONS "$<$<CONFIG:Release,RelWithDebInfo>:-O1>")
 set(RHEC_PRECOMPILED_HEADERS
   <algorithm> <array> <charconv> <chrono> <cmath> <filesystem> <fstream> <functional> <map> <memory> <numbers> <optional>
-  <set> <span> <string> <string_view> <utility> <vector> <fmt/format.h> "${CMAKE_CURRENT_LIST_DIR}/eigen/compiled_once.hpp")
+  <set> <span> <string> <string_view> <utility> <vector> 
+  "${CMAKE_CURRENT_LIST_DIR}/compiled_once/eigen.hpp" "${CMAKE_CURRENT_LIST_DIR}/compiled_once/fmt.hpp")
 # ccache is to know what a precompiled header holds. gcc 12 warns of sums of texts, once std::string is precompiled, that they
 # are written beyond the short texts' place in the object, or onto themselves.
 set(RHEC_PRECOMPILED_OPTIONS "$<$<CXX_COMPILER_ID:GNU>:-fpch-preprocess;-Wno-array-bounds;-Wno-stringop-overflow;-Wno-restrict>")
@@ -131,7 +132,16 @@ function(rhec_unite TARGET)
       endif()
     endforeach()
   endif()
-  set_target_properties(${TARGET} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 10)
+  # As many sources in each, so that none is left over; fewer where they are compiled again after a change.
+  get_target_property(SOURCES ${TARGET} SOURCES)
+  list(LENGTH SOURCES COUNT)
+  set(MOST 16)
+  if(RHEC_TESTS_LINK_OBJECTS)
+    set(MOST 10)
+  endif()
+  math(EXPR UNITS "(${COUNT} + ${MOST} - 1) / ${MOST}")
+  math(EXPR SIZE "(${COUNT} + ${UNITS} - 1) / ${UNITS}")
+  set_target_properties(${TARGET} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE ${SIZE})
 endfunction()
 
 # rhec_objects_of(VARIABLE TARGET name ...): objects of a library's or a plugin's sources <name>.cpp, for tests that call
@@ -156,14 +166,13 @@ function(rhec_objects_of VARIABLE TARGET)
   set(${VARIABLE} "$<FILTER:$<TARGET_OBJECTS:${TARGET}>,INCLUDE,/(${NAMES})[.]cpp>" PARENT_SCOPE)
 endfunction()
 
-# rhec_add_room(FLOOR ROOM [INTERNAL] [SHARED] [APART] [AFTER room ...] [SOURCES ...] [PUBLIC ...] [PRIVATE ...])
+# rhec_add_room(FLOOR ROOM [INTERNAL] [SHARED] [AFTER room ...] [SOURCES ...] [PUBLIC ...] [PRIVATE ...])
 #   A room of a floor, in its own folder: the target `rhec_<FLOOR>_<ROOM>`. It sees the public headers of the rooms of the same
 #   floor that it comes AFTER, and of those that they come after, and no others. The headers in <folder>/include are
-#   installed, those of an INTERNAL room are not. Sources of a room that is APART are never compiled as one: it has names
-#   that are used in several of them. What is compiled is a part of the floor's library, or of a SHARED room a
+#   installed, those of an INTERNAL room are not. What is compiled is a part of the floor's library, or of a SHARED room a
 #   library of its own, `rhec::<FLOOR>_<ROOM>`, which is linked to those of the rooms before it that it needs.
 function(rhec_add_room FLOOR ROOM)
-  cmake_parse_arguments(PARSE_ARGV 2 ARG "APART;INTERNAL;SHARED" "" "AFTER;SOURCES;PUBLIC;PRIVATE")
+  cmake_parse_arguments(PARSE_ARGV 2 ARG "INTERNAL;SHARED" "" "AFTER;SOURCES;PUBLIC;PRIVATE")
   if(ARG_UNPARSED_ARGUMENTS)
     message(FATAL_ERROR "rhec_add_room(${FLOOR} ${ROOM}): what is '${ARG_UNPARSED_ARGUMENTS}'?")
   endif()
@@ -191,7 +200,7 @@ function(rhec_add_room FLOOR ROOM)
     target_link_libraries(${TARGET} INTERFACE ${ARG_AFTER} ${ARG_PUBLIC})
     target_compile_features(${TARGET} INTERFACE cxx_std_20)
   endif()
-  if(ARG_SOURCES AND NOT ARG_APART)
+  if(ARG_SOURCES)
     rhec_unite(${TARGET})
   endif()
   if(NOT ARG_INTERNAL)

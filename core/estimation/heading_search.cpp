@@ -15,9 +15,9 @@ constexpr double part = 2.0 * std::numbers::pi / HeadingSearch::starts;
 // Headings that differ by less are one [rad].
 constexpr double alike = 0.2;
 // The best heading has to explain the data e^25 times better than each different one.
-constexpr double decisive = 25.0;
+constexpr double decisive_for_headings = 25.0;
 // A single outlier must not decide: largest share of a measurement, in squared standard deviations.
-constexpr double most_surprise = 16.0;
+constexpr double most_surprise_of_headings = 16.0;
 // Samples in a row that the heading found has to explain.
 constexpr int proof = 4;
 
@@ -56,7 +56,8 @@ bool HeadingSearch::update(const std::vector<Sensor>& sensors, const double* out
     for (const Sensor& sensor : sensors) {
       if (!heading.filter.innovation(sensor, outputs, innovation_)) continue;
       if (innovation_.nis > chi_square_limit(static_cast<int>(innovation_.value.size()), gate_)) heading.explained = 0;
-      const double surprise = std::min(innovation_.nis, most_surprise * static_cast<double>(innovation_.value.size()));
+      const double surprise =
+          std::min(innovation_.nis, most_surprise_of_headings * static_cast<double>(innovation_.value.size()));
       heading.log_likelihood -= 0.5 * (surprise + log_determinant(innovation_.covariance));
     }
     heading.filter.update(outputs);
@@ -67,7 +68,7 @@ bool HeadingSearch::update(const std::vector<Sensor>& sensors, const double* out
   const int h = best().model().description().roles.heading;
   for (const Heading& other : headings_) {
     const bool agrees = std::abs(angle_difference(other.filter.mean()[h], best().mean()[h])) < alike;
-    if (!agrees && other.log_likelihood > headings_[best_].log_likelihood - decisive) return false;
+    if (!agrees && other.log_likelihood > headings_[best_].log_likelihood - decisive_for_headings) return false;
   }
   // Of headings that are alike, none may be as vague as at the start.
   if (best().covariance()(h, h) > alike * alike || headings_[best_].explained < proof) return false;

@@ -36,9 +36,9 @@ struct PositionFix {
   double gone = 0.0;
 };
 
-class Track {
+class AlignedTrack {
  public:
-  Track(const RheProblem& problem, const Model& vehicle, std::vector<double>& states, std::vector<double>& inputs,
+  AlignedTrack(const RheProblem& problem, const Model& vehicle, std::vector<double>& states, std::vector<double>& inputs,
         const std::vector<double>& parameters)
       : problem_(problem),
         model_(vehicle),
@@ -255,7 +255,7 @@ class Track {
 
 void align_track(const RheProblem& problem, const Model& vehicle, std::vector<double>& states,
                  std::vector<double>& inputs, const std::vector<double>& parameters) {
-  Track(problem, vehicle, states, inputs, parameters).align();
+  AlignedTrack(problem, vehicle, states, inputs, parameters).align();
 }
 
 }  // namespace rhec

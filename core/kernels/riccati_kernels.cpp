@@ -753,8 +753,9 @@ RHEC_ALWAYS_INLINE inline void sensitivities_stage_forward(const Stage& stage, c
 /// one. The compiled sizes are those of estimators and controllers with two inputs: vehicles with three to five states
 /// plus parameters, between the starts of blocks, where the parameters are carried; that of a controller with the rate
 /// of one input; and the most common ones where blocks start. The row length has no other effect: a QP gives the same
-/// bits with another capacity. General shapes differ by the rows' length only if it `counts`.
-template <bool is_written_out, bool length_counts = true, class Function>
+/// bits with another capacity. General shapes differ by the rows' length only if it `counts`. Those with process noise
+/// are many and large, and unrolled only if `noise_is_written_out`.
+template <bool is_written_out, bool length_counts = true, bool noise_is_written_out = is_written_out, class Function>
 inline auto with_shape(const RiccatiView& view, int i, const Function& function) {
   const int states = view.states, controls = view.control_counts[i], carried = view.identity_counts[i];
   const bool is_full = view.state_counts[i] == states && view.state_counts[i + 1] == states;
@@ -775,12 +776,14 @@ inline auto with_shape(const RiccatiView& view, int i, const Function& function)
     }
     // Process noise: of one, two or four states, as inputs, beside two inputs of the vehicle.
     if (states == 6 && carried == 2) {
-      if (controls == 3) return function.template operator()<Shape<2, 6, 3, is_written_out, 2, 16>>();
-      if (controls == 4) return function.template operator()<Shape<2, 6, 4, is_written_out, 2, 16>>();
-      if (controls == 6) return function.template operator()<Shape<2, 6, 6, is_written_out, 2, 16>>();
+      if (controls == 3) return function.template operator()<Shape<2, 6, 3, noise_is_written_out, 2, 16>>();
+      if (controls == 4) return function.template operator()<Shape<2, 6, 4, noise_is_written_out, 2, 16>>();
+      if (controls == 6) return function.template operator()<Shape<2, 6, 6, noise_is_written_out, 2, 16>>();
     }
-    if (states == 6 && controls == 3) return function.template operator()<Shape<2, 6, 3, is_written_out, 0, 16>>();
-    if (states == 6 && controls == 4) return function.template operator()<Shape<2, 6, 4, is_written_out, 0, 16>>();
+    if (states == 6 && controls == 3)
+      return function.template operator()<Shape<2, 6, 3, noise_is_written_out, 0, 16>>();
+    if (states == 6 && controls == 4)
+      return function.template operator()<Shape<2, 6, 4, noise_is_written_out, 0, 16>>();
   }
   if constexpr (!length_counts) return function.template operator()<Shape<16, 0, 0>>();
   const int columns = states + controls;
@@ -863,9 +866,10 @@ RHEC_ALWAYS_INLINE inline void each_register(const Function& function) {
   for (int first = 0; first < response_batch; first += lane_count) function(first);
 }
 
+// Bounds are seldom active where there is process noise, and then for few stages: the loops of its shapes stay loops.
 void sensitivities_backward(const RiccatiView& view, int last, const unsigned char* has_gradient, double* gradients) {
   for (int i = last < view.intervals ? last : view.intervals - 1; i >= 0;)
-    with_shape<true, false>(view, i, [&]<class Stage>() {
+    with_shape<true, false, false>(view, i, [&]<class Stage>() {
       const int alike = i;
       do {
         const Stage stage(view, i);
@@ -880,7 +884,7 @@ void sensitivities_backward(const RiccatiView& view, int last, const unsigned ch
 
 void sensitivities_forward(const RiccatiView& view, int last, double* sensitivities, double* costates) {
   for (int i = 0; i < view.intervals;)
-    with_shape<true, false>(view, i, [&]<class Stage>() {
+    with_shape<true, false, false>(view, i, [&]<class Stage>() {
       const int alike = i;
       do {
         const Stage stage(view, i);
@@ -1194,7 +1198,7 @@ void form_general(const RiccatiView& view, int i, double* out) {
 }
 
 void form(const RiccatiView& view, int i, double* out) {
-  with_shape<matrices_fit>(view, i, [&]<class Stage>() {
+  with_shape<matrices_fit, true, false>(view, i, [&]<class Stage>() {
     if constexpr (Stage::is_known) {
       typename Stage::R X[Stage::most_columns]{};
       const Stage stage(view, i);

@@ -14,11 +14,6 @@
 #include "rhec/logs/signals/clock.hpp"
 
 namespace rhec::logs {
-namespace {
-
-constexpr double missing = std::numeric_limits<double>::quiet_NaN();
-constexpr std::string_view header_type = "std_msgs/msg/Header", time_type = "builtin_interfaces/msg/Time";
-
 struct StructureWant;
 
 /// One item of an array that is asked for.
@@ -43,6 +38,11 @@ struct StructureWant {
   std::vector<std::string> keys;
   std::vector<std::int64_t> places;  ///< by key, in the message that is being read; -1: not there
 };
+
+namespace {
+
+constexpr double missing = std::numeric_limits<double>::quiet_NaN();
+constexpr std::string_view header_type = "std_msgs/msg/Header", time_type = "builtin_interfaces/msg/Time";
 
 bool is_number(Kind kind) { return size_of(kind) > 0; }
 

@@ -17,7 +17,7 @@ namespace {
 
 constexpr double far_from_width = 100.0;  // a scale wrong by this factor misleads finite differences and solvers
 
-struct Kind {
+struct KindOfVariable {
   const char* word;
   const std::vector<Variable>& variables;
 };
@@ -26,7 +26,7 @@ struct Kind {
 struct Role {
   const char* name;
   int index;
-  const Kind& kind;
+  const KindOfVariable& kind;
   const char* unit;
   bool is_angle;
 };
@@ -44,7 +44,7 @@ class Description {
     if (about_.outputs.empty())
       findings_.warn("model", "it has no outputs that are measured: nothing can be estimated",
                      "add outputs, or mark some as usual");
-    for (const Kind& kind : kinds_)
+    for (const KindOfVariable& kind : kinds_)
       for (const Variable& variable : kind.variables) check(kind, variable);
     check_meanings();
     check_names();
@@ -77,7 +77,7 @@ class Description {
                      fmt::format("they have no meaning: {}", fmt::join(without_meaning_, ", ")), advice);
   }
 
-  void check(const Kind& kind, const Variable& v) {
+  void check(const KindOfVariable& kind, const Variable& v) {
     const std::string where = fmt::format("{} {}", kind.word, v.name);
     const auto bad = [](unsigned char c) { return std::isspace(c) || std::iscntrl(c) || c == '.' || c == ','; };
     if (v.name.empty())
@@ -104,7 +104,7 @@ class Description {
   /// Bounds are set by name for states, inputs and parameters alike; outputs have a separate name space.
   void check_names() {
     std::map<std::string, const char*> owners, outputs;
-    for (const Kind& kind : kinds_) {
+    for (const KindOfVariable& kind : kinds_) {
       auto& taken = &kind.variables == &about_.outputs ? outputs : owners;
       for (const Variable& v : kind.variables) {
         if (v.name.empty()) continue;
@@ -158,18 +158,18 @@ class Description {
   }
 
   const ModelDescription& about_;
-  const Kind kinds_[4] = {
+  const KindOfVariable kinds_[4] = {
       {"state", about_.states}, {"input", about_.inputs}, {"parameter", about_.parameters}, {"output", about_.outputs}};
   FindingList findings_{"description"};
   std::vector<std::string> without_meaning_;
   bool can_go_on_ = true;
 };
 
-std::vector<double> drawn(const std::vector<Variable>& variables, double margin, RandomStream& random) {
+std::vector<double> drawn(const std::vector<Variable>& variables, double kept_off, RandomStream& random) {
   std::vector<double> values;
   for (const Variable& variable : variables) {
     const auto [lower, upper] = range_of(variable, 1.0);
-    const double room = margin * (upper - lower);
+    const double room = kept_off * (upper - lower);
     values.push_back(random.uniform(lower + room, upper - room));
   }
   return values;

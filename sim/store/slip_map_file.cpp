@@ -14,8 +14,8 @@ namespace rhec::sim {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr std::int64_t application = 0x72686d70;  // 'rhmp': how a map is told from other databases
-constexpr std::int64_t version = 1;
+constexpr std::int64_t map_application = 0x72686d70;  // 'rhmp': how a map is told from other databases
+constexpr std::int64_t map_version = 1;
 
 constexpr const char* slip_map_schema = R"(
   CREATE TABLE about (vehicle TEXT NOT NULL, model TEXT NOT NULL, frame TEXT NOT NULL, origin_x REAL NOT NULL,
@@ -33,12 +33,12 @@ constexpr const char* slip_map_schema = R"(
 
 void require_map(SqliteDatabase& database) {
   const fs::path& file = database.file();
-  if (database.number("PRAGMA application_id") != application)
+  if (database.number("PRAGMA application_id") != map_application)
     refuse(file, "is no map of slip; expected a file that estimator.memory.file or 'rhec map merge' has written");
   const std::int64_t found = database.number("PRAGMA user_version");
-  if (found != version)
+  if (found != map_version)
     refuse(file, fmt::format("is a map of version {}; expected version {}: use the rhec that wrote it, or drive anew",
-                             found, version));
+                             found, map_version));
   database.require_whole();
   database.require_tables({"about", "parameters", "cells", "slip"});
 }
@@ -112,7 +112,7 @@ void write_slip_map(const fs::path& file, const SlipMapContent& content) {
     SqliteDatabase database(folder.file(file.filename().string()));
     database.execute(
         "PRAGMA journal_mode = OFF; PRAGMA synchronous = FULL");  // it is moved into place once it is whole
-    database.execute(fmt::format("PRAGMA application_id = {}; PRAGMA user_version = {}", application, version));
+    database.execute(fmt::format("PRAGMA application_id = {}; PRAGMA user_version = {}", map_application, map_version));
     SqliteTransaction all(database);
     database.execute(slip_map_schema);
     SqliteStatement about = database.prepare("INSERT INTO about VALUES (?1, ?2, ?3, ?4, ?5, ?6)");

@@ -51,6 +51,8 @@ constexpr const char* columns =
 
 constexpr int start_patience = 1000, write_patience = 60000;  // [ms]
 
+}  // namespace
+
 /// A lock that ends with the process, however it ends. It is a separate file next to the database, since SQLite locks
 /// the database itself.
 class LockFile {
@@ -101,6 +103,8 @@ class LockFile {
   fs::path path_;
   int descriptor_ = -1;
 };
+
+namespace {
 
 fs::path checked(const fs::path& file) {
   if (file.empty() || !file.has_filename())

@@ -10,13 +10,13 @@ namespace rhec::sim {
 namespace {
 
 // Ground that is driven before fixes count: until then the filter finds its heading. At most this share of the log.
-constexpr double found_after = 25.0, most_found = 0.1;
+constexpr double table_found_after = 25.0, most_of_table = 0.1;
 
 /// From when on the heading should be known [s].
 double known_from(const std::vector<DeadReckoning>& rows) {
-  const double most = rows.front().time + most_found * (rows.back().time - rows.front().time);
+  const double most = rows.front().time + most_of_table * (rows.back().time - rows.front().time);
   double covered = 0.0, from = rows.front().time;
-  for (std::size_t i = 1; i < rows.size() && covered < found_after && rows[i].time < most; ++i) {
+  for (std::size_t i = 1; i < rows.size() && covered < table_found_after && rows[i].time < most; ++i) {
     if (!std::isnan(rows[i].speed)) covered += std::abs(rows[i].speed) * (rows[i].time - rows[i - 1].time);
     from = rows[i].time;
   }

@@ -2,7 +2,7 @@
 
 // What Eigen would compile anew for every source that multiplies, solves or decomposes matrices of any size: inner
 // loops, which it never inlines, and decompositions. Sources with the precompiled headers, which declare this, take
-// them from the static library rhec_eigen; a source without those headers has its own.
+// them from the static library rhec_compiled_once; a source without those headers has its own.
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
@@ -12,7 +12,7 @@
 // What is named below is inside Eigen 3.4; with another version each source has its own.
 #if EIGEN_VERSION_AT_LEAST(3, 4, 0) && !EIGEN_VERSION_AT_LEAST(3, 4, 50)
 
-#ifndef RHEC_COMPILED_ONCE  // compiled_once.cpp defines it as nothing
+#ifndef RHEC_COMPILED_ONCE  // eigen.cpp defines it as nothing
 #define RHEC_COMPILED_ONCE extern
 #endif
 

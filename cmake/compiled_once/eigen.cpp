@@ -1,0 +1,2 @@
+#define RHEC_COMPILED_ONCE
+#include "eigen.hpp"

@@ -1,2 +1,0 @@
-#define RHEC_COMPILED_ONCE
-#include "compiled_once.hpp"
