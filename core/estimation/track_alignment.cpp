@@ -38,8 +38,8 @@ struct PositionFix {
 
 class AlignedTrack {
  public:
-  AlignedTrack(const RheProblem& problem, const Model& vehicle, std::vector<double>& states, std::vector<double>& inputs,
-        const std::vector<double>& parameters)
+  AlignedTrack(const RheProblem& problem, const Model& vehicle, std::vector<double>& states,
+               std::vector<double>& inputs, const std::vector<double>& parameters)
       : problem_(problem),
         model_(vehicle),
         roles_(model_.description().roles),

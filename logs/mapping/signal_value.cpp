@@ -8,7 +8,7 @@ namespace rhec::logs {
 namespace {
 
 constexpr double missing = std::numeric_limits<double>::quiet_NaN();
-constexpr const char* fix_type = "sensor_msgs/msg/NavSatFix";
+constexpr const char* type_of_fix = "sensor_msgs/msg/NavSatFix";
 
 double place_in_plane(SignalForm form, std::span<const double> fields, std::optional<LocalPlane>& plane) {
   const bool has_status = fields.size() == 4;
@@ -39,7 +39,7 @@ std::vector<SignalName> fields_of(const MappedSignal& signal, const std::string&
     parts = {"x", "y", "z", "w"};
   } else if (form == SignalForm::east || form == SignalForm::north || form == SignalForm::up) {
     parts = {"latitude", "longitude", "altitude"};
-    if (type == fix_type) parts.emplace_back("status.status");
+    if (type == type_of_fix) parts.emplace_back("status.status");
   } else {
     return signal.from;
   }
