@@ -213,8 +213,8 @@ Report GnRti::real_time(Iterate& iterate, Clock::time_point deadline) noexcept {
   return report;
 }
 
-/// Puts controls onto their active bounds. Rounding leaves some beyond them, and the guess of the next sample has these
-/// inside: it would be another point, whose intervals had to be linearised once more.
+/// Puts controls back that rounding has left beyond their active bounds. The guess of the next sample has them inside:
+/// it would be another point, whose intervals had to be linearised once more.
 void GnRti::clip_active_controls(Iterate& iterate) const noexcept {
   const int N = qp_->intervals();
   for (int i = 0; i < N; ++i) {
