@@ -168,8 +168,7 @@ class RHEC_EXPORT DualActiveSet {
   int most_columns_ = 0, batch_count_ = 0, most_changes_ = 0;
   int places_ = 0, all_places_ = 0;  ///< number of places that the QP uses: of variables, and of limits too
   bool has_limits_ = false;
-  bool needs_all_held_ = false;
-  bool is_convex_ = false, has_bounds_ = false, has_policy_ = false, has_base_ = false;
+  bool needs_all_held_ = false, is_convex_ = false, has_bounds_ = false, has_policy_ = false, has_base_ = false;
   double pull_tolerance_ = 0.0, miss_ = 0.0;
   const double *lower_ = nullptr, *upper_ = nullptr;  ///< of the QP that is being solved
   ActiveSet held_, claimed_;
