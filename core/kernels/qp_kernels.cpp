@@ -207,6 +207,14 @@ ViolationParts find_violations(const double* values, const double* least, const 
   return {largest_of(largest), static_cast<int>(sum_of(counts))};
 }
 
+void largest_of_eight(const double* values, long count, double* largest) {
+  for (long k = 0; k < count; k += 8) {
+    Lanes most = load(values + k);
+    for (long v = lane_count; v < 8; v += lane_count) most = larger(most, load(values + k + v));
+    largest[k / 8] = largest_of(most);
+  }
+}
+
 void widen_bounds(const double* lower, const double* upper, double tolerance, long count, double* least, double* most) {
   for (long k = 0; k < count; k += lane_count) {
     const Lanes from = load(lower + k), to = load(upper + k);
@@ -296,24 +304,22 @@ int find_columns(const LimitView& view, int used, short* columns) {
 template <int known_columns>
 void limit_sensitivities_of(const LimitView& view, const short* columns, const double* steps, double* values) {
   constexpr int size = 8;
+  using Steps = Row<size / lane_count>;
   const long stride = view.stride;
   int at[known_columns];
   for (int k = 0; k < known_columns; ++k) at[k] = columns[k];
   for (int i = 0; i <= view.intervals; ++i, steps += stride * size) {
-    const double* G = view.G + i * view.limits * stride;
-    double* const end = values + static_cast<long>(view.row) * size;
-    double* const used_end = values + static_cast<long>(view.counts[i]) * size;
-    for (int first = 0; first < size; first += lane_count) {
-      Lanes of_column[known_columns];
-      for (int k = 0; k < known_columns; ++k) of_column[k] = load(steps + at[k] * size + first);
-      const double* row = G;
-      for (double* to = values; to < used_end; to += size, row += stride) {
-        Lanes sum{};
-        for (int k = 0; k < known_columns; ++k) sum += of_column[k] * row[at[k]];
-        store(sum, to + first);
-      }
+    const double* row = view.G + i * view.limits * stride;
+    const double* const end = values + static_cast<long>(view.row) * size;
+    const double* const used_end = values + static_cast<long>(view.counts[i]) * size;
+    Steps of_column[known_columns];
+    for (int k = 0; k < known_columns; ++k) of_column[k] = Steps::from(steps + at[k] * size);
+    for (; values < used_end; values += size, row += stride) {
+      Steps sum{};
+      for (int k = 0; k < known_columns; ++k) sum.add(of_column[k], row[at[k]]);
+      sum.to(values);
     }
-    for (values = used_end; values < end; values += lane_count) store(Lanes{}, values);
+    for (; values < end; values += size) Steps{}.to(values);
   }
 }
 
@@ -356,6 +362,7 @@ constinit const QpKernels RHEC_TABLE(qp_kernels_, RHEC_SET) = {&kernels::kkt,
                                                                &kernels::check_step,
                                                                &kernels::mark_bounds,
                                                                &kernels::find_violations,
+                                                               &kernels::largest_of_eight,
                                                                &kernels::widen_bounds,
                                                                &kernels::add,
                                                                &kernels::limits_are_sound,

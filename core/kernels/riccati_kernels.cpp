@@ -663,64 +663,80 @@ RHEC_ALWAYS_INLINE inline void solve_stage_forward(const RiccatiView& view, int 
 using Batch = Row<response_batch / lane_count>;
 
 /// A register of every entry of a batch: with the entries of all registers at once, those of a stage would not fit into
-/// the processor's. `gradients` begins at this register.
-template <class Stage>
+/// the processor's. `gradients` begins at this register. If carried states keep their values, they take no part.
+template <class Stage, bool keeps_carried>
 RHEC_ALWAYS_INLINE inline void sensitivities_stage_backward(const Stage& stage, const Memory<Stage>& at,
                                                             bool has_gradient, bool has_next, double* own) {
   const double* next = own + at.stride * response_batch;
   Lanes costates[Stage::most_states], gradient[Stage::most_columns];
-  stage.each_next_state([&](auto l)
-                            RHEC_ALWAYS_INLINE { costates[l] = has_next ? load(next + l * response_batch) : Lanes{}; });
+  const auto each_state = [&](const auto& function) RHEC_ALWAYS_INLINE {
+    if constexpr (keeps_carried)
+      stage.each_moved(function);
+    else
+      stage.each_state(function);
+  };
+  const auto take = [&](auto l)
+                        RHEC_ALWAYS_INLINE { costates[l] = has_next ? load(next + l * response_batch) : Lanes{}; };
+  if constexpr (keeps_carried)
+    stage.each_moved(take);
+  else
+    stage.each_next_state(take);
   const auto form = [&](auto k) RHEC_ALWAYS_INLINE {
     Lanes sum = has_gradient ? load(own + k * response_batch) : Lanes{};
     stage.each_moved([&](auto l) RHEC_ALWAYS_INLINE { sum += costates[l] * at.AB[l * at.stride + k]; });
-    if (k >= stage.moved && k < stage.next_states) sum += costates[k];
+    if (!keeps_carried && k >= stage.moved && k < stage.next_states) sum += costates[k];
     gradient[k] = sum;
   };
   stage.each_control([&](auto k) RHEC_ALWAYS_INLINE {
     form(k);
     store(gradient[k], own + k * response_batch);
   });
-  stage.each_state(form);
+  each_state(form);
   stage.each_control_back([&](auto k) RHEC_ALWAYS_INLINE {
     if (at.sides[k] != 0) return;
     const double* column = at.U + (k - stage.offset) * at.stride;
     const Lanes of_control = gradient[k] * -at.inverse[k - stage.offset];
     const auto add = [&](auto j) RHEC_ALWAYS_INLINE { gradient[j] += of_control * column[j]; };
     stage.each_control_before(k, add);
-    stage.each_state(add);
+    each_state(add);
     store(gradient[k], own + k * response_batch);
   });
-  stage.each_state([&](auto k) RHEC_ALWAYS_INLINE { store(gradient[k], own + k * response_batch); });
+  each_state([&](auto k) RHEC_ALWAYS_INLINE { store(gradient[k], own + k * response_batch); });
 }
 
 /// The same forwards. Behind the last stage with a gradient, the gradients of value functions and controls are zero.
 /// `costates` (null: none) are those of the next node.
-template <class Stage>
+template <class Stage, bool keeps_carried>
 RHEC_ALWAYS_INLINE inline void sensitivities_stage_forward(const Stage& stage, const Memory<Stage>& at,
                                                            bool has_gradient, bool has_next, double* own,
                                                            double* costates) {
   double* next = own + at.stride * response_batch;
   Lanes z[Stage::most_columns];
-  stage.each_state([&](auto j) RHEC_ALWAYS_INLINE { z[j] = load(own + j * response_batch); });
+  const auto each_state = [&](const auto& function) RHEC_ALWAYS_INLINE {
+    if constexpr (keeps_carried)
+      stage.each_moved(function);
+    else
+      stage.each_state(function);
+  };
+  each_state([&](auto j) RHEC_ALWAYS_INLINE { z[j] = load(own + j * response_batch); });
   stage.each_control([&](auto k) RHEC_ALWAYS_INLINE {
     z[k] = Lanes{};
     if (at.sides[k] != 0) return;
     const double* column = at.U + (k - stage.offset) * at.stride;
     Lanes sum = has_gradient ? load(own + k * response_batch) : Lanes{};
     const auto add = [&](auto j) RHEC_ALWAYS_INLINE { sum += z[j] * column[j]; };
-    stage.each_state(add);
+    each_state(add);
     stage.each_control_before(k, add);
     z[k] = sum * -at.inverse[k - stage.offset];
   });
   const auto next_state = [&](auto l) RHEC_ALWAYS_INLINE {
     Lanes sum{};
     const auto add = [&](auto j) RHEC_ALWAYS_INLINE { sum += z[j] * at.AB[l * at.stride + j]; };
-    stage.each_state(add);
+    each_state(add);
     stage.each_control(add);
     return sum;
   };
-  if (costates) {
+  if (!keeps_carried && costates) {
     Lanes reached[Stage::most_states];
     stage.each_moved([&](auto l) RHEC_ALWAYS_INLINE { reached[l] = next_state(l); });
     stage.each_carried([&](auto l) RHEC_ALWAYS_INLINE { reached[l] = z[l]; });
@@ -732,7 +748,8 @@ RHEC_ALWAYS_INLINE inline void sensitivities_stage_forward(const Stage& stage, c
     stage.each_next_state([&](auto l) RHEC_ALWAYS_INLINE { store(reached[l], next + l * response_batch); });
   } else {
     stage.each_moved([&](auto l) RHEC_ALWAYS_INLINE { store(next_state(l), next + l * response_batch); });
-    stage.each_carried([&](auto l) RHEC_ALWAYS_INLINE { store(z[l], next + l * response_batch); });
+    stage.each_carried([&](auto l)
+                           RHEC_ALWAYS_INLINE { store(keeps_carried ? Lanes{} : z[l], next + l * response_batch); });
   }
   stage.each_control([&](auto k) RHEC_ALWAYS_INLINE {
     Lanes answer = z[k];
@@ -741,7 +758,7 @@ RHEC_ALWAYS_INLINE inline void sensitivities_stage_forward(const Stage& stage, c
       const double* column = at.U + (k - stage.offset) * at.stride;
       Lanes sum = has_gradient ? load(own + k * response_batch) : Lanes{};
       const auto add = [&](auto j) RHEC_ALWAYS_INLINE { sum += z[j] * column[j]; };
-      stage.each_state(add);
+      each_state(add);
       stage.each_control(add);
       answer = -sum;
     }
@@ -867,7 +884,9 @@ RHEC_ALWAYS_INLINE inline void each_register(const Function& function) {
 }
 
 // Bounds are seldom active where there is process noise, and then for few stages: the loops of its shapes stay loops.
-void sensitivities_backward(const RiccatiView& view, int last, const unsigned char* has_gradient, double* gradients) {
+template <bool keeps_carried>
+void sensitivities_backward_of(const RiccatiView& view, int last, const unsigned char* has_gradient,
+                               double* gradients) {
   for (int i = last < view.intervals ? last : view.intervals - 1; i >= 0;)
     with_shape<true, false, false>(view, i, [&]<class Stage>() {
       const int alike = i;
@@ -876,13 +895,21 @@ void sensitivities_backward(const RiccatiView& view, int last, const unsigned ch
         const Memory<Stage> at(view, i);
         double* own = gradients + i * at.stride * response_batch;
         each_register([&](int first) RHEC_ALWAYS_INLINE {
-          sensitivities_stage_backward<Stage>(stage, at, has_gradient[i] != 0, i < last, own + first);
+          sensitivities_stage_backward<Stage, keeps_carried>(stage, at, has_gradient[i] != 0, i < last, own + first);
         });
       } while (--i >= 0 && is_alike(view, alike, i));
     });
 }
 
-void sensitivities_forward(const RiccatiView& view, int last, double* sensitivities, double* costates) {
+void sensitivities_backward(const RiccatiView& view, int last, const unsigned char* has_gradient, double* gradients) {
+  if (view.keeps_carried)
+    sensitivities_backward_of<true>(view, last, has_gradient, gradients);
+  else
+    sensitivities_backward_of<false>(view, last, has_gradient, gradients);
+}
+
+template <bool keeps_carried>
+void sensitivities_forward_of(const RiccatiView& view, int last, double* sensitivities, double* costates) {
   for (int i = 0; i < view.intervals;)
     with_shape<true, false, false>(view, i, [&]<class Stage>() {
       const int alike = i;
@@ -893,11 +920,18 @@ void sensitivities_forward(const RiccatiView& view, int last, double* sensitivit
         double* own = sensitivities + i * row;
         double* of_next = costates ? costates + (i + 1) * row : nullptr;
         each_register([&](int first) RHEC_ALWAYS_INLINE {
-          sensitivities_stage_forward<Stage>(stage, at, i <= last, i < last, own + first,
-                                             of_next ? of_next + first : nullptr);
+          sensitivities_stage_forward<Stage, keeps_carried>(stage, at, i <= last, i < last, own + first,
+                                                            of_next ? of_next + first : nullptr);
         });
       } while (++i < view.intervals && is_alike(view, alike, i));
     });
+}
+
+void sensitivities_forward(const RiccatiView& view, int last, double* sensitivities, double* costates) {
+  if (view.keeps_carried)
+    sensitivities_forward_of<true>(view, last, sensitivities, nullptr);
+  else
+    sensitivities_forward_of<false>(view, last, sensitivities, costates);
 }
 
 void combine(const double* batch, const double* weights, double* sums, long count) {

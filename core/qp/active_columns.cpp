@@ -5,6 +5,8 @@
 #include <cmath>
 
 #include "rhec/core/base/infinity.hpp"
+#include "rhec/core/kernels/kernel_sets.hpp"
+#include "rhec/core/kernels/qp_kernels.hpp"
 #include "rhec/core/qp/dual_active_set.hpp"
 #include "sensitivity_sums.hpp"
 
@@ -98,13 +100,10 @@ bool DualActiveSet::find_sensitivities_of_next(const StageQp& qp, Riccati& ricca
   };
   // Rows are padded to multiples of eight, and few of them have one that is chosen.
   constexpr int eight = 8;
-  for (int begin = 0; begin < all_places_; begin += eight) {
-    const double* violations = violation_.data() + begin;
-    double largest[2] = {violations[0], violations[1]};
-    for (int j = 2; j < eight; ++j) largest[j % 2] = std::max(largest[j % 2], violations[j]);
-    if (!(std::max(largest[0], largest[1]) > least)) continue;
-    for (int j = 0; j < eight; ++j) take(begin + j);
-  }
+  qp_kernels().largest_of_eight(violation_.data(), all_places_, largest_.data());
+  for (int begin = 0; begin < all_places_; begin += eight)
+    if (largest_[begin / eight] > least)
+      for (int j = 0; j < eight; ++j) take(begin + j);
   return find_sensitivities(qp, riccati, places.data(), count);
 }
 

@@ -21,6 +21,9 @@ constexpr int violated_for_each_column = 2;
 // So many of a batch of sensitivities are for bounds that are likely to be active, the others for those that are
 // violated.
 constexpr int most_foreseen = 6;
+// Claims that all become columns with limits: two batches, where a wrong one that is held takes a factorisation and a
+// batch more.
+constexpr int few_claims = 2 * Riccati::Sensitivities::size;
 // Places that a batch keeps for bounds that enter when columns of controls are chosen.
 constexpr int few_entering = 3;
 // Number of solutions with an unchanged active set before rounding errors are assumed, and how many of them are
@@ -29,6 +32,8 @@ constexpr int max_refinements = 4, max_combined = 2;
 // With limits the interior-point method, which comes next, takes as long as some hundred of them. Before, columns of
 // controls are held.
 constexpr int max_refinements_with_limits = 8, refinements_before_holding = 3;
+// A miss of which a refinement leaves more than this share is rounding.
+constexpr double less = 0.5;
 // With limits, what refinement may leave of the misses: where rounding prevents more, the interior-point method gets no
 // further either, and takes a hundred times as long.
 constexpr double rounding = 10.0;
@@ -56,6 +61,7 @@ DualActiveSet::DualActiveSet(const Capacity& capacity)
     saturated_.reserve(stages * capacity.limits);
   }
   for (auto* v : {&value_, &violation_, &least_, &most_, &h_}) v->assign(most, 0.0);
+  largest_.assign(most / 8 + 1, 0.0);
   hold_.assign(most, Hold::free);
   side_.assign(most, 0);
   number_.assign(most, none);
@@ -132,6 +138,10 @@ void DualActiveSet::factor(const StageQp& qp, Riccati& riccati) noexcept {
     is_convex_ = !riccati.was_convexified();
   }
   ++factorisations_;
+  forget_factorisation();
+}
+
+void DualActiveSet::forget_factorisation() noexcept {
   has_base_ = false;
   for (Batch& batch : batches_) {
     for (int c = 0; c < batch.count; ++c) number_[batch.of[c]] = none;
@@ -139,7 +149,34 @@ void DualActiveSet::factor(const StageQp& qp, Riccati& riccati) noexcept {
   }
 }
 
-void DualActiveSet::prepare(const StageQp& qp, Riccati& riccati, const ActiveSet* claimed) noexcept {
+/// Makes columns of the held claims: of all, or of those at the ends of sequences.
+void DualActiveSet::loosen_claims(const StageQp& qp, const ActiveSet& claimed, bool all) noexcept {
+  std::erase_if(held_places_, [&](int place) {
+    const int stage = place / stride_, j = place % stride_;
+    const auto goes_on = [&](int other) {
+      return other < 0 || other >= qp.intervals() || claimed.row(other)[j] == side_[place];
+    };
+    if (!all && (column_count() == most_foreseen || (goes_on(stage - 1) && goes_on(stage + 1)))) return false;
+    held_.row(stage)[j] = 0;
+    hold_[place] = Hold::column;
+    multipliers_[column_count()] = 0.0;
+    columns_.push_back(place);
+    return true;
+  });
+}
+
+/// Holds the columns from the given one on.
+void DualActiveSet::hold_claims(int first) noexcept {
+  for (int k = first; k < column_count(); ++k) {
+    const int place = columns_[k];
+    hold_[place] = Hold::held;
+    held_places_.push_back(place);
+    held_.row(place / stride_)[place % stride_] = side_[place];
+  }
+  columns_.resize(first);
+}
+
+void DualActiveSet::prepare(const StageQp& qp, Riccati& riccati, const ActiveSet* claimed, bool is_factored) noexcept {
   factorisations_ = 0;
   has_bounds_ = false;
   for (const auto* places : {&held_places_, &columns_, &saturated_})
@@ -151,35 +188,27 @@ void DualActiveSet::prepare(const StageQp& qp, Riccati& riccati, const ActiveSet
   places_ = (qp.intervals() + 1) * stride_;
   all_places_ = places_ + (qp.intervals() + 1) * limit_row_;
   if (claimed) take_claims(qp, *claimed);
-  // Where sensitivities are needed anyway, the ends of a sequence of active bounds are columns: these are dropped more
-  // often than those between, and a column is dropped without another factorisation.
-  // All are columns where one batch has room for them.
-  const int first_end = column_count();
-  if (has_limits_ && first_end > 0 && first_end < batch_size) {
-    const bool are_few = first_end + static_cast<int>(held_places_.size()) <= batch_size;
-    std::erase_if(held_places_, [&](int place) {
-      const int stage = place / stride_, j = place % stride_;
-      const auto goes_on = [&](int other) {
-        return other < 0 || other >= qp.intervals() || claimed->row(other)[j] == side_[place];
-      };
-      if (!are_few && (column_count() == most_foreseen || (goes_on(stage - 1) && goes_on(stage + 1)))) return false;
-      held_.row(stage)[j] = 0;
-      hold_[place] = Hold::column;
-      multipliers_[column_count()] = 0.0;
-      columns_.push_back(place);
-      return true;
-    });
+  // Where sensitivities are needed anyway, held bounds become columns as far as two batches have room for them: a
+  // column is dropped without another factorisation. If there are more, or the QP is convex only with some of them
+  // held, then the ends of a sequence of active bounds, which are dropped more often than those between.
+  const int first_end = column_count(), claims = first_end + static_cast<int>(held_places_.size());
+  const bool may_loosen = has_limits_ && first_end > 0 && first_end < batch_size && !held_places_.empty();
+  const bool are_few = claims <= few_claims;
+  if (may_loosen) loosen_claims(qp, *claimed, are_few);
+  if (is_factored && held_places_.empty()) {
+    is_convex_ = true;
+    forget_factorisation();
+  } else {
+    factor(qp, riccati);
   }
-  factor(qp, riccati);
-  if (!is_convex_ && column_count() > first_end) {
-    // Held bounds may make the QP convex.
-    for (int k = first_end; k < column_count(); ++k) {
-      const int place = columns_[k];
-      hold_[place] = Hold::held;
-      held_places_.push_back(place);
-      held_.row(place / stride_)[place % stride_] = side_[place];
-    }
-    columns_.resize(first_end);
+  if (!is_convex_ && may_loosen && are_few && claims > batch_size) {
+    hold_claims(first_end);
+    loosen_claims(qp, *claimed, false);
+    factor(qp, riccati);
+  }
+  needs_all_held_ = !is_convex_ && column_count() > first_end;
+  if (needs_all_held_) {
+    hold_claims(first_end);
     factor(qp, riccati);
   }
   if (has_limits_) keep_rows(qp);
@@ -298,6 +327,27 @@ double DualActiveSet::largest_miss() const noexcept {
   return largest;
 }
 
+/// Drops a column and changes the multipliers of the others so that their bounds stay met: along the column of the
+/// inverse of S that belongs to it, until its own multiplier is zero.
+void DualActiveSet::release_column(int k, Weights& weights) noexcept {
+  const int count = column_count();
+  double direction[max_columns_with_limits];
+  std::fill_n(direction, k, 0.0);
+  direction[k] = factor_row(k)[k];
+  for (int l = k + 1; l < count; ++l) {
+    const double* row = factor_row(l);
+    direction[l] = -dot(row + k, direction + k, l - k) * row[l];
+  }
+  back_substitute(direction);
+  const double length = multipliers_[k] / direction[k];
+  for (int l = 0; l < count; ++l) {
+    const double change = -length * direction[l];
+    weight_of(columns_[l], weights) += change;
+    multipliers_[l] += change;
+  }
+  drop_column(k);
+}
+
 /// Corrects the column that is most wrong, and the multipliers of the others, until none is: where one was the reason
 /// for others, these stay. Values of all places follow at the end.
 bool DualActiveSet::drop_wrong_columns(const Riccati& riccati) noexcept {
@@ -328,8 +378,13 @@ bool DualActiveSet::drop_wrong_columns(const Riccati& riccati) noexcept {
   };
   for (int worst = find_worst(); worst != none; worst = find_worst()) {
     const int place = columns_[worst];
+    if (has_limits_ && !is_soft(place)) {
+      release_column(worst, weights);
+      ++changes_;
+      continue;
+    }
     Weights weight{};
-    if (has_limits_ && is_soft(place)) {
+    if (has_limits_) {
       if (!correct_soft_column(worst, weight)) break;
     } else {
       weight_of(place, weight) = -multipliers_[worst];
@@ -630,7 +685,8 @@ DualActiveSet::Found DualActiveSet::find_values(const StageQp& qp, Riccati& ricc
     base_places_ = columns_;
     std::copy_n(multipliers_.begin(), column_count(), base_multipliers_.begin());
   }
-  if (largest_miss() <= exactness) return check.violates ? Found::values : Found::step;
+  miss_ = largest_miss();
+  if (miss_ <= exactness) return check.violates ? Found::values : Found::step;
   return_to_bounds(riccati);
   return Found::values;
 }
@@ -676,6 +732,7 @@ DualActiveSet::Outcome DualActiveSet::solve(const StageQp& qp, Riccati& riccati,
     return chosen;
   };
   const int most_refinements = has_limits_ ? max_refinements_with_limits : max_refinements;
+  double last_miss = infinity;  // of the same active set
   for (int refinements = 0; refinements < most_refinements; ++refinements) {
     if (!is_convex_) return give_up_not_convex();
     const int changes_before = changes_;
@@ -725,11 +782,16 @@ DualActiveSet::Outcome DualActiveSet::solve(const StageQp& qp, Riccati& riccati,
     } else if (found == Found::step) {
       write(qp, active, step);
       return Outcome::solved;
-    } else if (has_limits_ && refinements == refinements_before_holding && holds_no_column()) {
+    } else if (has_limits_ && (refinements == refinements_before_holding || miss_ > less * last_miss)) {
       // Rounding: the columns of controls are nearly dependent. Held, they are exact.
-      if (is_past(deadline)) return Outcome::out_of_time;
-      if (!refactor(qp, riccati)) return give_up_not_convex();
+      if (holds_no_column()) {
+        if (is_past(deadline)) return Outcome::out_of_time;
+        if (!refactor(qp, riccati)) return give_up_not_convex();
+      }
+      last_miss = infinity;
+      continue;
     }
+    last_miss = needs_factor || changes_ > changes_before ? infinity : miss_;
   }
   if (!has_limits_) return Outcome::too_much;
   // The active set is right, and what is left of the misses is rounding.

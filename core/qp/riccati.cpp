@@ -78,6 +78,15 @@ bool holds_any(const std::int8_t* sides, int count) noexcept {
   return std::any_of(sides, sides + count, [](std::int8_t side) { return side != 0; });
 }
 
+/// Whether all stages carry the same states.
+bool carries_alike(const StageQp& qp) noexcept {
+  const int N = qp.intervals(), states = qp.states(0);
+  int differences = 0;
+  for (int i = 0; i < N; ++i)
+    differences |= (qp.states(i + 1) ^ states) | (qp.identity_counts()[i] ^ qp.identity_counts()[0]);
+  return differences == 0 && states == qp.capacity().states;
+}
+
 static_assert(small::longest >= Riccati::max_width);
 
 }  // namespace
@@ -249,8 +258,8 @@ bool Riccati::find_sensitivities(const StageQp& qp, const ActiveSet& active, con
   for (int c = 0; c < count; ++c) last = std::max(last, gradients[c].stage);
   std::fill_n(has_gradient_.data(), N + 1, std::uint8_t{0});
   const auto clear = [&](int stage) {
-    const std::ptrdiff_t first = static_cast<std::ptrdiff_t>(stage) * stride_ * size;
-    std::fill_n(values + first, (ns_ + qp.controls(stage)) * size, 0.0);
+    const std::size_t entries = static_cast<std::size_t>(ns_ + qp.controls(stage)) * size;
+    std::memset(values + static_cast<std::ptrdiff_t>(stage) * stride_ * size, 0, entries * sizeof(double));
   };
   for (int c = 0; c < count; ++c) {
     const auto [stage, place, row] = gradients[c];
@@ -263,7 +272,8 @@ bool Riccati::find_sensitivities(const StageQp& qp, const ActiveSet& active, con
     }
     for (int j = 0; j < ns_ + qp.controls(stage); ++j) entries[j * size] = row[j];
   }
-  const RiccatiView view = view_of(qp, active.row(0));
+  RiccatiView view = view_of(qp, active.row(0));
+  view.keeps_carried = qp.initial_state_is_given && !costates && carries_alike(qp);
   kernels_->sensitivities_backward(view, last, has_gradient_.data(), values);
   if (qp.initial_state_is_given) {
     if (costates) std::copy_n(values, n * size, costates);

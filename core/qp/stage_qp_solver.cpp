@@ -100,8 +100,8 @@ void StageQpSolver::prepare(const StageQp& qp) noexcept {
   }
 }
 
-void StageQpSolver::prepare_changes(const StageQp& qp) noexcept {
-  dual_.prepare(qp, riccati_, any_active_ ? &active_ : nullptr);
+void StageQpSolver::prepare_changes(const StageQp& qp, bool is_factored) noexcept {
+  dual_.prepare(qp, riccati_, any_active_ ? &active_ : nullptr, is_factored);
   prepared_ = true;
 }
 
@@ -192,12 +192,13 @@ StageQpSolver::Outcome StageQpSolver::solve_limited(const StageQp& qp, Iterate& 
     if (!is_first && is_past(deadline)) return Outcome::out_of_time;
     if (!is_first && may_augment() && solve_augmented(qp, step, deadline)) return Outcome::active_set;
     if (out_of_time_) return Outcome::out_of_time;
-    const StageQp& convex = convexify_limited(qp);
+    bool is_factored = false;
+    const StageQp& convex = convexify_limited(qp, is_factored);
     if (is_first) {
       not_convex_ = is_convexified_ ? not_convex_ + 1 : 0;
       --wait_;
     }
-    prepared_ = false;
+    prepare_changes(convex, is_factored);
     outcome = solve_from_guess(convex, step, deadline);
   }
   if (outcome == DualActiveSet::Outcome::solved) return Outcome::active_set;
@@ -210,7 +211,7 @@ DualActiveSet::Outcome StageQpSolver::solve_from_guess(const StageQp& qp, Iterat
   if (!prepared_) prepare_changes(qp);
   prepared_ = false;
   // If the QP was convex only with all its claims held, it rarely is once some of them are released.
-  const bool is_open = is_cheap_ && qp.has_limits() && !is_convexified_ && dual_.factorisations() > 1;
+  const bool is_open = is_cheap_ && qp.has_limits() && !is_convexified_ && dual_.needs_all_held();
   const auto outcome =
       is_open ? DualActiveSet::Outcome::not_convex : dual_.solve(qp, riccati_, active_, step, deadline);
   is_dual_ = outcome == DualActiveSet::Outcome::solved;
@@ -283,11 +284,12 @@ const StageQp& StageQpSolver::convexify(const StageQp& qp) noexcept {
   return convexified_;
 }
 
-/// The same for a QP with limits, in a fraction of the time.
-const StageQp& StageQpSolver::convexify_limited(const StageQp& qp) noexcept {
+/// The same for a QP with limits, in a fraction of the time. Tells whether the result is factorised already.
+const StageQp& StageQpSolver::convexify_limited(const StageQp& qp, bool& is_factored) noexcept {
   if (!is_convexified_) convexified_.take_stages(qp);
   ++factorisations_;
   if (!riccati_.convexify(convexified_, no_bounds_)) return convexify(qp);
+  is_factored = qp.initial_state_is_given;
   if (!riccati_.was_convexified()) return solved(qp);
   is_convexified_ = was_convexified_ = true;
   return convexified_;

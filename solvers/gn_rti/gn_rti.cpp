@@ -194,6 +194,7 @@ Report GnRti::real_time(Iterate& iterate, Clock::time_point deadline) noexcept {
     // The step is turned into the new iterate in place, and the swap keeps the old iterate where the step was: the
     // processor's cache has room for only a few horizons.
     add_to_step(ocp_->intervals(), iterate, step_);
+    if (!limits_.empty()) clip_active_controls(step_);
     const bool is_last = iteration + 1 == options_.iterations;
     if (!is_last && !assess_step(step_, report)) {
       report.status = Status::stalled;
@@ -210,6 +211,20 @@ Report GnRti::real_time(Iterate& iterate, Clock::time_point deadline) noexcept {
   }
   if (report.status == Status::infeasible || report.status == Status::stalled) report.status = Status::iteration_limit;
   return report;
+}
+
+/// Puts controls back that rounding has left beyond their active bounds. The guess of the next sample has them inside:
+/// it would be another point, whose intervals had to be linearised once more.
+void GnRti::clip_active_controls(Iterate& iterate) const noexcept {
+  const int N = qp_->intervals();
+  for (int i = 0; i < N; ++i) {
+    const double* const multipliers = iterate.control_bound(i);
+    for (int j = 0; j < qp_->controls(i); ++j) {
+      if (multipliers[j] == 0.0) continue;
+      double& value = iterate.control(i)[j];
+      value = std::clamp(value, ocp_->control_lower(i)[j], ocp_->control_upper(i)[j]);
+    }
+  }
 }
 
 /// Linearises at a new iterate, as the next sample will need it; false if the result is not finite.

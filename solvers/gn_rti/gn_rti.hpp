@@ -63,6 +63,7 @@ class GnRti final : public Solver {
   void linearise(Iterate& iterate) noexcept;
   void settle(Iterate& iterate, Report& report) noexcept;
   Report real_time(Iterate& iterate, Clock::time_point deadline) noexcept;
+  void clip_active_controls(Iterate& iterate) const noexcept;
   bool assess_step(const Iterate& iterate, Report& report) noexcept;
   void give_up(const Iterate& iterate, Report& report) noexcept;
   Report converge(Iterate& iterate, Clock::time_point deadline) noexcept;

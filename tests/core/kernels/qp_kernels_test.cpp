@@ -122,6 +122,10 @@ TEST(QpKernels, ComputeWhatTheySay) {
       }
       EXPECT_EQ(found.count, violated) << set.instruction_set;
       EXPECT_EQ(found.largest, worst) << set.instruction_set;
+      std::vector<double> largest(width / 8, 0.0);
+      set.qp->largest_of_eight(a.data(), width, largest.data());
+      for (int k = 0; k < width; k += 8)
+        EXPECT_EQ(largest[k / 8], *std::max_element(a.data() + k, a.data() + k + 8)) << set.instruction_set;
     }
   }
 }

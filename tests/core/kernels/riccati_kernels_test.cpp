@@ -168,6 +168,47 @@ TEST(RiccatiKernels, OfResponsesAreWhatAStepDiffersBy) {
   }
 }
 
+TEST(RiccatiKernels, OfResponsesMayLeaveOutStatesThatKeepTheirValues) {
+  RandomQp random(17);
+  for (int trial = 0; trial < 60; ++trial) {
+    const int states = trial % 2 == 0 ? random.integer(5, 8) : random.integer(2, 12), carried = random.integer(1, 3);
+    StageQp qp = random.make(random.integer(1, 6), states, random.integer(2, 4), true);
+    const int N = qp.intervals(), kept = std::min(carried, states - 1);
+    for (int i = 0; i < N; ++i) {
+      for (int r = states - kept; r < states; ++r) {
+        std::fill_n(qp.AB(i) + r * qp.stride(), qp.stride(), 0.0);
+        qp.AB(i)[r * qp.stride() + r] = 1.0;
+      }
+      qp.set_sizes(i, states, qp.controls(i), kept);
+    }
+    const ActiveSet active = some_active_controls(random, qp);
+    const int stage = random.integer(0, N);
+    AlignedDoubles gradients(static_cast<std::size_t>(N + 1) * qp.stride() * response_batch, 0.0);
+    std::vector<unsigned char> has_gradient(N + 1, 0);
+    has_gradient[stage] = 1;
+    const auto row = [&](AlignedDoubles& of, int i) {
+      return of.data() + static_cast<std::ptrdiff_t>(i) * qp.stride() * response_batch;
+    };
+    for (int k = 0; k < (states + qp.controls(stage)) * response_batch; ++k)
+      row(gradients, stage)[k] = random.uniform(-1.0, 1.0);
+    for (const KernelSet& set : runnable_kernels()) {
+      Recursion recursion(qp, active);
+      recursion.solve(*set.riccati);
+      AlignedDoubles values[2] = {gradients, gradients};
+      for (const bool keeps_carried : {false, true}) {
+        recursion.view.keeps_carried = keeps_carried;
+        AlignedDoubles& of = values[keeps_carried];
+        set.riccati->sensitivities_backward(recursion.view, stage, has_gradient.data(), of.data());
+        std::fill_n(of.data(), states * response_batch, 0.0);
+        set.riccati->sensitivities_forward(recursion.view, stage, of.data(), nullptr);
+      }
+      for (int i = 0; i <= N; ++i)
+        for (int k = 0; k < (states + qp.controls(i)) * response_batch; ++k)
+          ASSERT_NEAR(row(values[1], i)[k], row(values[0], i)[k], 1e-10) << set.instruction_set << ", stage " << i;
+    }
+  }
+}
+
 TEST(RiccatiKernels, OfTheRecursionStopWhereTheReducedHessianIsNotDefinite) {
   RandomQp random(8);
   for (int trial = 0; trial < 20; ++trial) {

@@ -96,6 +96,44 @@ TEST(DualLimits, SolvesWithRowsThatChangeAfterThePreparation) {
   EXPECT_GT(active, 500);
 }
 
+TEST(DualLimits, DropsAFewWrongClaimsWithoutAnotherFactorisation) {
+  RandomQp random(37);
+  int wrong = 0, tried = 0;
+  for (int trial = 0; trial < 200; ++trial) {
+    const StageQp qp = limited_qp(random, true, {.room = 0.5});
+    StageQpSolver solver(qp.capacity());
+    Iterate step(qp.capacity()), again(qp.capacity());
+    solver.guess_from(qp, step);
+    if (solver.solve(qp, step) != StageQpSolver::Outcome::active_set) continue;
+    int columns = 0, controls = 0;
+    for (int i = 0; i <= qp.intervals(); ++i) {
+      for (int r = 0; r < qp.limits(i); ++r) columns += step.limit_bound(i)[r] != 0.0;
+      for (int j = 0; j < qp.states(i); ++j) columns += step.state_bound(i)[j] != 0.0;
+      for (int j = 0; j < qp.controls(i); ++j) controls += step.control_bound(i)[j] != 0.0;
+    }
+    if (columns == 0 || columns >= 8 || columns + controls > 15) continue;
+    Iterate claim = step;
+    for (int i = 0; i < qp.intervals(); ++i) {
+      for (int j = 0; j < qp.controls(i) && columns + controls < 16; ++j) {
+        const double upper = qp.control_upper(i)[j];
+        if (claim.control_bound(i)[j] != 0.0 || upper == infinity) continue;
+        claim.control_bound(i)[j] = 1.0;
+        ++controls;
+        ++wrong;
+      }
+    }
+    solver.guess_from(qp, claim);
+    solver.prepare(qp);
+    ASSERT_EQ(solver.solve(qp, again), StageQpSolver::Outcome::active_set) << trial;
+    EXPECT_EQ(solver.factorisations(), 1) << trial;
+    EXPECT_LT(kkt_violation(qp, again), 1e-6) << trial;
+    EXPECT_LT(distance(qp, step, again), 1e-5) << trial;
+    ++tried;
+  }
+  EXPECT_GT(tried, 50);
+  EXPECT_GT(wrong, 200);
+}
+
 TEST(DualLimits, AcceptWhatRoundingLeaves) {
   // Only the last control is cheap enough to bring a state of some millions to zero, to which numbers of that size do
   // not add up by less than a few 1e-10.

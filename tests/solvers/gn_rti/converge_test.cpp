@@ -135,6 +135,40 @@ TEST(GnRtiLimits, RealTimeStepsComeToTheSameSolutionWithoutAllocating) {
   }
 }
 
+TEST(GnRtiLimits, RealTimeStepsLeaveNoInputBeyondItsBounds) {
+  int active = 0;
+  for (unsigned seed = 1; seed <= 8; ++seed) {
+    Case one(seed, 0.1, infinity, 0.0);
+    ASSERT_TRUE(one.is_solved) << "seed " << seed;
+    const int nu = one.problem->model().input_count();
+    for (int i = 0; i < one.problem->intervals(); ++i)
+      for (int j = 0; j < nu; ++j)
+        one.problem->input_upper(i, j) =
+            std::max(one.problem->input_lower(i, j), one.start.control(i)[j] - 0.01 * (1.0 + (seed + i + j) % 7));
+    std::vector<double> scratch(one.problem->scratch_size());
+    one.problem->finish(scratch);
+    const auto solver = gn_rti("{mode: rti}");
+    solver->setup(*one.limited);
+    Iterate iterate = one.start;
+    for (int sample = 0; sample < 4; ++sample) {
+      if (solver->solve(iterate).status != Status::step_taken) break;
+      for (int i = 0; i < one.limited->intervals(); ++i) {
+        for (int j = 0; j < one.limited->control_count(i); ++j) {
+          const double multiplier = iterate.control_bound(i)[j];
+          if (multiplier == 0.0) continue;
+          ++active;
+          // To the last bit: the next guess, which is clipped, is the same point then.
+          EXPECT_GE(iterate.control(i)[j], one.limited->control_lower(i)[j])
+              << "seed " << seed << ", sample " << sample;
+          EXPECT_LE(iterate.control(i)[j], one.limited->control_upper(i)[j])
+              << "seed " << seed << ", sample " << sample;
+        }
+      }
+    }
+  }
+  EXPECT_GT(active, 50);
+}
+
 TEST(GnRtiLimits, SaysSoWhereHardLimitsContradictEachOtherAndSoftOnesDoNot) {
   Case one(2, 0.1, infinity, 0.0);
   const int ns = one.problem->capacity().states;

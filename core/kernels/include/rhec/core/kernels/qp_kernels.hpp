@@ -58,6 +58,8 @@ struct QpKernels {
   /// violations = max(least - values, values - most) for `count` entries, a multiple of eight.
   ViolationParts (*find_violations)(const double* values, const double* least, const double* most, long count,
                                     double* violations);
+  /// The largest of each eight of `count` entries, a multiple of eight.
+  void (*largest_of_eight)(const double* values, long count, double* largest);
   /// least = lower - tolerance (1 + |lower|) and most = upper + tolerance (1 + |upper|) for `count` entries.
   void (*widen_bounds)(const double* lower, const double* upper, double tolerance, long count, double* least,
                        double* most);

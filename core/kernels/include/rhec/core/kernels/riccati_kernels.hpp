@@ -22,7 +22,8 @@ struct RiccatiView {
   const double* diagonal = nullptr;       ///< one row per stage, added to the diagonal of H; or null
   const std::int8_t* sides = nullptr;     ///< one row per stage: which bounds are active
   const std::uint8_t* special = nullptr;  ///< stages that the kernels skip
-  bool for_steps = true;  ///< whether a step is needed; otherwise `drift` and `T` are neither written nor read
+  bool keeps_carried = false;  ///< all stages carry the same states, which are given: sensitivities of these are zero
+  bool for_steps = true;       ///< whether a step is needed; otherwise `drift` and `T` are neither written nor read
 
   double* P = nullptr;  ///< n_s rows per node
   double* U = nullptr;  ///< n_w rows per stage: columns of the reduced Hessian, each as it is eliminated
@@ -51,7 +52,8 @@ struct RiccatiKernels {
   /// Sensitivities to `response_batch` gradients at once, interleaved: each entry of a row holds those of all
   /// gradients. Backward: from the gradients of the stages up to `last` (zero unless `has_gradient` is set) to those of
   /// the value functions, in place. Forward: from these and the initial states to the sensitivities, in place, and
-  /// their costates, unless that is null. Rows without gradients are not read. There must be no special stage.
+  /// their costates, unless that is null. Rows without gradients are not read. There must be no special stage. Carried
+  /// states do not change if the view says so; there are no costates then.
   void (*sensitivities_backward)(const RiccatiView& view, int last, const unsigned char* has_gradient,
                                  double* gradients);
   void (*sensitivities_forward)(const RiccatiView& view, int last, double* sensitivities, double* costates);

@@ -48,8 +48,8 @@ class RHEC_EXPORT DualActiveSet {
   explicit DualActiveSet(const Capacity& capacity);
 
   /// Work that needs only the QP's matrices: factorises with the claimed active set (null: none) and finds
-  /// sensitivities.
-  void prepare(const StageQp& qp, Riccati& riccati, const ActiveSet* claimed) noexcept;
+  /// sensitivities. If `is_factored`, the recursion has factorised the QP without active bounds already.
+  void prepare(const StageQp& qp, Riccati& riccati, const ActiveSet* claimed, bool is_factored = false) noexcept;
   /// After `prepare`, with the QP's present vectors. If solved, writes the active set to `active` and the minimiser,
   /// its costates and multipliers to `step`. Checks the deadline before every change of the active set.
   Outcome solve(const StageQp& qp, Riccati& riccati, ActiveSet& active, Iterate& step,
@@ -60,6 +60,8 @@ class RHEC_EXPORT DualActiveSet {
   void complete_policy(const StageQp& qp, Riccati& riccati) noexcept;
   /// Number since the last `prepare`.
   int factorisations() const noexcept { return factorisations_; }
+  /// Whether the QP of the last `prepare` is convex only with all claimed bounds of controls held.
+  bool needs_all_held() const noexcept { return needs_all_held_; }
 
  private:
   enum class Hold : std::uint8_t { free, held, column, saturated };
@@ -80,6 +82,9 @@ class RHEC_EXPORT DualActiveSet {
   void take_claims(const StageQp& qp, const ActiveSet& claimed) noexcept;
   bool take_bounds(const StageQp& qp) noexcept;
   void factor(const StageQp& qp, Riccati& riccati) noexcept;
+  void forget_factorisation() noexcept;
+  void loosen_claims(const StageQp& qp, const ActiveSet& claimed, bool all) noexcept;
+  void hold_claims(int first) noexcept;
   bool refactor(const StageQp& qp, Riccati& riccati) noexcept;
   void let_go(int place) noexcept;
   bool is_limit(int place) const noexcept { return place >= places_; }
@@ -130,6 +135,7 @@ class RHEC_EXPORT DualActiveSet {
   bool solve_with_multipliers(const StageQp& qp, Riccati& riccati, Iterate& step) noexcept;
   double largest_miss() const noexcept;
   void return_to_bounds(const Riccati& riccati) noexcept;
+  void release_column(int column, Weights& weights) noexcept;
   bool drop_wrong_columns(const Riccati& riccati) noexcept;
   bool release_wrong_held() noexcept;
   bool drop_wrong(const Riccati& riccati) noexcept;
@@ -162,12 +168,12 @@ class RHEC_EXPORT DualActiveSet {
   int most_columns_ = 0, batch_count_ = 0, most_changes_ = 0;
   int places_ = 0, all_places_ = 0;  ///< number of places that the QP uses: of variables, and of limits too
   bool has_limits_ = false;
-  bool is_convex_ = false, has_bounds_ = false, has_policy_ = false, has_base_ = false;
-  double pull_tolerance_ = 0.0;
+  bool needs_all_held_ = false, is_convex_ = false, has_bounds_ = false, has_policy_ = false, has_base_ = false;
+  double pull_tolerance_ = 0.0, miss_ = 0.0;
   const double *lower_ = nullptr, *upper_ = nullptr;  ///< of the QP that is being solved
   ActiveSet held_, claimed_;
   // By place. For a held variable, the value is its multiplier, since this is what changes.
-  std::vector<double> value_, violation_;
+  std::vector<double> value_, violation_, largest_;  ///< the last: of each eight violations
   /// The bounds widened by their tolerance; infinite for variables that are not free.
   std::vector<double> least_, most_;
   std::vector<Hold> hold_;

@@ -75,7 +75,7 @@ class RHEC_EXPORT StageQpSolver {
   };
   void factor(const StageQp& qp) noexcept;
   bool claim_is_likely(const StageQp& qp) const noexcept;
-  void prepare_changes(const StageQp& qp) noexcept;
+  void prepare_changes(const StageQp& qp, bool is_factored = false) noexcept;
   DualActiveSet::Outcome solve_from_guess(const StageQp& qp, Iterate& step, Clock::time_point deadline) noexcept;
   Violations correct_active_set(const StageQp& qp, const Iterate& step) noexcept;
   bool try_active_sets(const StageQp& qp, Iterate& step, int rounds, Clock::time_point deadline) noexcept;
@@ -93,7 +93,7 @@ class RHEC_EXPORT StageQpSolver {
   Outcome solve_robustly(const StageQp& qp, Iterate& step, Clock::time_point deadline) noexcept;
   bool interior_point(const StageQp& qp, Iterate& step, const Accuracy& wanted, Clock::time_point deadline) noexcept;
   const StageQp& convexify(const StageQp& qp) noexcept;
-  const StageQp& convexify_limited(const StageQp& qp) noexcept;
+  const StageQp& convexify_limited(const StageQp& qp, bool& is_factored) noexcept;
 
   /// One bounded variable or limit in the interior-point method: slacks and multipliers of its two sides. A soft side
   /// has the slack of its violation too, with a multiplier of its own; it is eliminated from the Newton system.
