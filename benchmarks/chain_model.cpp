@@ -8,8 +8,8 @@
 
 #define RHEC_JOINED(a, b) a##b
 #define RHEC_JOIN(a, b) RHEC_JOINED(a, b)
-#define RHEC_TEXT_OF(a) #a
-#define RHEC_TEXT(a) RHEC_TEXT_OF(a)
+#define RHEC_TEXT_OF_CHAIN(a) #a
+#define RHEC_CHAIN_TEXT(a) RHEC_TEXT_OF_CHAIN(a)
 #define RHEC_CHAIN_NAME RHEC_JOIN(chain_, RHEC_CHAIN)
 #define RHEC_CHAIN_KERNELS RHEC_JOIN(RHEC_CHAIN_NAME, _kernels)
 
@@ -25,7 +25,7 @@ using Formula = RHEC_JOIN(Chain, RHEC_CHAIN)<Scalar>;
 rhec::ModelDescription describe() {
   using Chain = Formula<double>;
   rhec::ModelDescription model;
-  model.name = RHEC_TEXT(RHEC_CHAIN_NAME);
+  model.name = RHEC_CHAIN_TEXT(RHEC_CHAIN_NAME);
   model.source = "Wirsching, Bock and Diehl (2006)";
   const auto triple = [](const std::string& letter, int number, const char* unit, const char* meaning) {
     std::vector<rhec::Variable> three;
@@ -56,7 +56,7 @@ class ChainModel : public rhec::FormulaModel<Formula> {
 }  // namespace
 
 RHEC_PLUGIN(rhec::PluginKind::model, ChainModel,
-            {.name = RHEC_TEXT(RHEC_CHAIN_NAME),
+            {.name = RHEC_CHAIN_TEXT(RHEC_CHAIN_NAME),
              .version = "1.0.0",
              .licence = "BSD-2-Clause",
              .source = "Wirsching, Bock and Diehl (2006)",
