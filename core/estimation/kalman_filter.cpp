@@ -261,16 +261,18 @@ void KalmanFilter::predict(const double* measured_input, const double* input_gue
 }
 
 void KalmanFilter::carry(Eigen::MatrixXd& deviations) noexcept {
-  for (Eigen::Index m = 0; m < deviations.cols(); ++m) {
-    double* each = deviations.col(m).data();
+  with_size(nx_, [&](auto nx) {
     double* __restrict moved = correction_.data();
-    std::fill_n(moved, nx_, 0.0);
-    for (int c = 0; c < nx_ + np_; ++c) {
-      const double* by = jacobian_.data() + static_cast<std::ptrdiff_t>(c < nx_ ? c : nu_ + c) * nx_;
-      for (int r = 0; r < nx_; ++r) moved[r] += by[r] * each[c];
+    for (Eigen::Index m = 0; m < deviations.cols(); ++m) {
+      double* each = deviations.col(m).data();
+      std::fill_n(moved, nx, 0.0);
+      for (int c = 0; c < nx_ + np_; ++c) {
+        const double* by = jacobian_.data() + (c < nx ? c : nu_ + c) * nx;
+        for (int r = 0; r < nx; ++r) moved[r] += by[r] * each[c];
+      }
+      std::copy_n(moved, nx, each);
     }
-    std::copy_n(moved, nx_, each);
-  }
+  });
 }
 
 /// Next state and its Jacobian for constant parameters, by the faster of the model's functions.
