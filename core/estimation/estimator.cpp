@@ -469,7 +469,10 @@ const Estimate& Estimator::estimate(double time, Clock::time_point deadline) noe
   }
   predicted_ = estimate_;
   // What is given out alone: everything goes on from what the method says.
-  if (is_in_doubt) watch_->widen(predicted_);
+  if (is_in_doubt) {
+    watch_->widen(predicted_);
+    clip(predicted_);
+  }
   if (!is_ahead) {
     assess(predicted_, std::isfinite(time) ? time : newest);
     return predicted_;

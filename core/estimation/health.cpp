@@ -34,6 +34,8 @@ const char* name_of_reason(std::uint32_t reason) noexcept {
       return "uncertain";
     case reason::starting:
       return "starting";
+    case reason::off:
+      return "off";
     default:
       return "";
   }
@@ -42,16 +44,20 @@ const char* name_of_reason(std::uint32_t reason) noexcept {
 std::string in_words(const Health& health, const std::vector<Sensor>& sensors) {
   std::string text = name_of(health.level);
   const char* separator = ": ";
-  const auto add = [&](const std::string& who, std::uint32_t reasons) {
+  const auto add = [&](const std::string& who, std::uint32_t reasons, const std::string& offset = "") {
     std::string words;
     for (const std::uint32_t each : reason::all)
-      if (reasons & each) words += fmt::format("{}{}", words.empty() ? "" : " and ", name_of_reason(each));
+      if (reasons & each)
+        words += fmt::format("{}{}{}", words.empty() ? "" : " and ", name_of_reason(each),
+                             each == reason::off ? offset : "");
     if (words.empty()) return;
     text += fmt::format("{}{}{}{}", separator, who, who.empty() ? "" : " ", words);
     separator = "; ";
   };
   add("", health.reasons);
-  for (std::size_t s = 0; s < health.sensors.size(); ++s) add(sensors[s].name, health.sensors[s].reasons);
+  for (std::size_t s = 0; s < health.sensors.size(); ++s)
+    add(sensors[s].name, health.sensors[s].reasons,
+        fmt::format(" by about {:.2g} {}", health.sensors[s].offset, sensors[s].unit));
   add("inputs", health.inputs.reasons);
   return text;
 }

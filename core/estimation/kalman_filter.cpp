@@ -260,6 +260,21 @@ void KalmanFilter::predict(const double* measured_input, const double* input_gue
   std::copy(next_.begin(), next_.end(), mean.data());
 }
 
+void KalmanFilter::carry(Eigen::MatrixXd& deviations) noexcept {
+  with_size(nx_, [&](auto nx) {
+    double* __restrict moved = correction_.data();
+    for (Eigen::Index m = 0; m < deviations.cols(); ++m) {
+      double* each = deviations.col(m).data();
+      std::fill_n(moved, nx, 0.0);
+      for (int c = 0; c < nx_ + np_; ++c) {
+        const double* by = jacobian_.data() + (c < nx ? c : nu_ + c) * nx;
+        for (int r = 0; r < nx; ++r) moved[r] += by[r] * each[c];
+      }
+      std::copy_n(moved, nx, each);
+    }
+  });
+}
+
 /// Next state and its Jacobian for constant parameters, by the faster of the model's functions.
 void KalmanFilter::differentiate(double duration) noexcept {
   std::copy_n(mean.data(), nx_ + np_, row_.data());

@@ -14,7 +14,7 @@ std::vector<Sensor> sensors_of(const ModelDescription& about, const std::vector<
     };
     const auto found = std::find_if(sensors.begin(), sensors.end(), has_output);
     if (found == sensors.end()) {
-      sensors.push_back({about.outputs[j].name, {j}});
+      sensors.push_back({about.outputs[j].name, {j}, about.outputs[j].unit});
       continue;
     }
     found->name += " and " + about.outputs[j].name;

@@ -11,6 +11,8 @@ namespace rhec {
 
 namespace {
 
+// Samples of a dispute after which a position may have been wrong before, when another sensor seemed to be.
+constexpr int suspect_position = 4;
 // In typical magnitudes, how far off a state can be that a sensor sees after it has moved.
 constexpr double displacement = 100.0;
 // Samples in a row that measured inputs must fit before they are believed again.
@@ -229,6 +231,12 @@ SensorWatch::Finding SensorWatch::settle(double time, const double* outputs) noe
     for (const int j : sensors_[s].outputs)
       memory_->first_errors[j] =
           (findings_[s] & reason::rejected) && sees_position(j) ? raw_[j] - own_->filter.expected(j) : Memory::unknown;
+  if (disputed_samples_ == suspect_position && is_position_disputed() && memory_->offsets->has_recent()) {
+    // A position that jumps may have drifted before, and what seemed to be off was right.
+    memory_->offsets->withdraw_recent(own_->filter);
+    own_->filter.update(outputs);
+    return accept(*own_);
+  }
   consider_moved(consider_slip());
   think_again();
   if (!is_blind_) {
@@ -238,7 +246,9 @@ SensorWatch::Finding SensorWatch::settle(double time, const double* outputs) noe
   // Slip that has jumped shows from the first sample on. Later the filter without the sensor knows so little that new
   // slip explains nearly anything.
   const bool has_begun_with_it = disputed_samples_ - slip_->explained < fresh;
-  if (slip_->explained >= (has_begun_with_it ? setup_.slip_proof : setup_.proof)) {
+  // Slip that would have to leave its bounds for what a compass says explains nothing of it.
+  const bool may_be_slip = is_position_disputed() || is_within_bounds(slip_->filter);
+  if (may_be_slip && slip_->explained >= (has_begun_with_it ? setup_.slip_proof : setup_.proof)) {
     Finding finding = accept(*slip_);
     for (Record& record : records_) record = {};
     acquit(outputs);
@@ -278,6 +288,16 @@ SensorWatch::Finding SensorWatch::settle(double time, const double* outputs) noe
   return {};
 }
 
+bool SensorWatch::is_within_bounds(const WalkingFilter& filter) const noexcept {
+  const Eigen::Index nx = filter.model().state_count();
+  bool is_within = true;
+  for (std::size_t j = 0; j < setup_.walk.size(); ++j) {
+    const double slip = filter.mean()[nx + static_cast<Eigen::Index>(j)];
+    is_within = is_within && slip > setup_.noise.parameter_lower[j] && slip < setup_.noise.parameter_upper[j];
+  }
+  return is_within;
+}
+
 /// What was held back, and what was rejected last, is right after all.
 void SensorWatch::acquit(const double* outputs) noexcept {
   const auto take_back = [&](auto&& was_rejected) {
@@ -291,13 +311,7 @@ void SensorWatch::acquit(const double* outputs) noexcept {
   take_back([&](int j) { return std::isnan(outputs[j]) && !std::isnan(raw_[j]); });
   for (std::uint32_t& each : findings_) each &= ~reason::rejected;
   // Slip at a bound may well be beyond it, as that of wheels that spin on the spot.
-  const Eigen::Index nx = own_->filter.model().state_count();
-  bool is_usual = memory_->was_calm;
-  for (std::size_t j = 0; j < setup_.walk.size(); ++j) {
-    const double slip = own_->filter.mean()[nx + static_cast<Eigen::Index>(j)];
-    is_usual = is_usual && slip > setup_.noise.parameter_lower[j] && slip < setup_.noise.parameter_upper[j];
-  }
-  if (!is_usual) return;
+  if (!memory_->was_calm || !is_within_bounds(own_->filter)) return;
   for (std::size_t s = 0; s < sensors_.size(); ++s) {
     states_[s].reasons &= ~reason::rejected;
     quiet_[s] = setup_.calm;
@@ -307,6 +321,7 @@ void SensorWatch::acquit(const double* outputs) noexcept {
 
 SensorWatch::Finding SensorWatch::accept(Hypothesis& hypothesis) noexcept {
   go_on_from(hypothesis.filter, own_->filter);
+  if (&hypothesis != slip_.get()) memory_->offsets->forget_onsets();
   end_dispute();
   return {.release = false, .rebase = true};
 }

@@ -19,6 +19,7 @@ constexpr double most_volume = 2.0, volume_memory = 10.0;
 
 void SensorWatch::judge_late(double time, double* outputs) noexcept {
   if (!is_active_) return;
+  memory_->offsets->correct(outputs);
   const Memory::Entry* last = nullptr;
   const auto known = static_cast<std::size_t>(std::min<std::int64_t>(memory_->count, Memory::remembered_samples));
   for (std::size_t i = 0; i < known; ++i) {
@@ -35,6 +36,7 @@ void SensorWatch::judge_late(double time, double* outputs) noexcept {
     if (!filter.innovation(sensors_[s], outputs, scratch_)) continue;
     if (scratch_.nis <= limit(s, scratch_.value.size())) {
       ++states_[s].accepted;
+      memory_->offsets->forget_onsets();  // they do not know what it changes
       continue;
     }
     ++states_[s].rejected;
@@ -62,12 +64,16 @@ void SensorWatch::follow(const Estimate& estimate) noexcept {
   own_->filter.covariance() = estimate.covariance;
 }
 
+bool SensorWatch::is_in_doubt() const noexcept { return slip_probability_ > 0.0 || memory_->offsets->has_any(); }
+
 void SensorWatch::widen(Estimate& estimate) noexcept {
+  memory_->offsets->refine(estimate);
   const Model& model = own_->filter.model();
   const Eigen::Index nx = model.state_count(), n = nx + model.parameter_count();
   const Eigen::VectorXd& mean = slip_->filter.mean();
   const Eigen::MatrixXd& covariance = slip_->filter.covariance();
-  if (!is_in_doubt() || estimate.covariance.rows() != n || !mean.allFinite() || !covariance.allFinite()) return;
+  if (!(slip_probability_ > 0.0) || estimate.covariance.rows() != n || !mean.allFinite() || !covariance.allFinite())
+    return;
   Eigen::VectorXd& away = memory_->away;
   away.head(nx) = mean.head(nx) - estimate.state;
   away.tail(n - nx) = mean.tail(n - nx) - estimate.parameters;

@@ -33,6 +33,9 @@ constexpr double longest_gap = 1.0;
 // its squared innovations have been over some five hundred samples, of which none counts more than this many times what
 // was expected, and those of one that is suspect not at all.
 constexpr double most_excess = 100.0, excess_memory = 500.0;
+// Standard deviations by which a sensor has to be off, in the sum of many samples. It is tested at every one of them,
+// with all times since when it may be so.
+constexpr double offset_gate = 7.5;
 
 WalkingFilter::Setup filter_setup(const SensorWatch::Setup& setup) {
   return {.noise = setup.noise,
@@ -75,6 +78,11 @@ SensorWatch::SensorWatch(std::shared_ptr<const Model> model, const Setup& setup)
   memory_ = std::make_unique<Memory>();
   memory_->stuck = StuckValues(setup_.noise.output_variances);
   memory_->trial = std::make_unique<WalkingFilter>(model, filter_setup(setup_));
+  std::vector<int> watched;  // where the vehicle is, an offset does not show
+  own_->filter.expect();
+  for (int j = 0; j < model->output_count(); ++j)
+    if (!sees_position(j)) watched.push_back(j);
+  memory_->offsets = std::make_unique<OffsetWatch>(*model, watched, setup_.noise, offset_gate);
   if (model->description().roles.heading >= 0)
     for (auto* each : {&memory_->search, &memory_->second_thought})
       *each = std::make_unique<HeadingSearch>(model, filter_setup(setup_), close_gate);
@@ -121,6 +129,7 @@ void SensorWatch::reset() noexcept {
   held_count_ = innovation_count_ = 0;
   memory_->count = 0;
   memory_->has_advanced = false;
+  memory_->offsets->reset();
   memory_->stuck.reset();
   std::fill(believed_input_.begin(), believed_input_.end(), 0.0);
 }
@@ -134,6 +143,7 @@ void SensorWatch::restart(const Eigen::VectorXd& mean, const Eigen::MatrixXd& co
   end_dispute();
   memory_->count = 0;
   memory_->has_advanced = false;
+  memory_->offsets->forget_onsets();
 }
 
 void SensorWatch::clean_inputs(double* inputs) noexcept {
@@ -158,6 +168,7 @@ void SensorWatch::advance(double duration, const double* inputs, const double* m
       memory_->before_mean = own_->filter.mean();
       memory_->before_covariance = own_->filter.covariance();
     }
+    memory_->offsets->forget_onsets();
     own_->filter.predict(inputs, duration, more_sigmas);
     if (memory_->search) memory_->search->cancel();
     end_dispute();
@@ -171,13 +182,16 @@ void SensorWatch::advance(double duration, const double* inputs, const double* m
   note_motion(duration, inputs);
   if (memory_->count > 0) std::copy(input_.begin(), input_.end(), memory_->entries[memory_->newest].inputs.begin());
   if (is_blind_) {
+    memory_->offsets->forget_onsets();
     blind_->filter.mean() = own_->filter.mean();
     blind_->filter.covariance() = own_->filter.covariance();
     blind_->filter.predict(believed_input_.data(), duration);
     own_->filter.mean() = blind_->filter.mean();
     own_->filter.covariance() = blind_->filter.covariance();
   } else {
+    own_->filter.carry(&memory_->offsets->sensitivities());
     own_->filter.predict(inputs, duration);
+    own_->filter.carry(nullptr);
   }
   if (!is_disputed_) return;
   if (slip_->is_active) slip_->filter.predict(inputs, duration);
@@ -210,6 +224,7 @@ SensorWatch::Finding SensorWatch::judge(double time, double* outputs) noexcept {
   std::fill(findings_.begin(), findings_.end(), 0u);
   held_count_ = is_disputed_ ? held_count_ : 0;
   Finding finding;
+  memory_->offsets->correct(outputs);
   if (is_searching()) {
     finding = search_heading(outputs);
   } else if (is_active_) {
@@ -222,6 +237,7 @@ SensorWatch::Finding SensorWatch::judge(double time, double* outputs) noexcept {
       const bool has_room = innovation_count_ < static_cast<int>(innovations_.size());
       Innovation& innovation = has_room ? innovations_[innovation_count_] : scratch_;
       if (!filter.innovation(sensors_[s], outputs, innovation)) continue;
+      memory_->offsets->widen(filter, sensors_[s], outputs, innovation);
       innovation_count_ += has_room;
       is_any_measured = true;
       innovation.time = time;
@@ -251,7 +267,15 @@ SensorWatch::Finding SensorWatch::judge(double time, double* outputs) noexcept {
       for (std::size_t j = 0; j < input_.size() && !is_blind_; ++j)
         if (!std::isnan(input_[j])) believed_input_[j] = input_[j];
     }
-    if (!finding.rebase && !finding.release) filter.update(outputs);
+    if (!finding.rebase && !finding.release) {
+      memory_->offsets->take(filter, outputs, std::max(1.0, *std::ranges::max_element(excesses_)));
+      filter.update(outputs);
+      if (!is_disputed && memory_->offsets->has_suspect()) {
+        memory_->offsets->adopt_suspected(filter);
+        end_dispute();
+        finding.rebase = true;
+      }
+    }
     // The estimator's own knowledge of the motion is wrong.
     if (is_blind_ || is_unobserved_) finding = {.release = false, .rebase = true};
     is_unobserved_ = false;
@@ -261,6 +285,7 @@ SensorWatch::Finding SensorWatch::judge(double time, double* outputs) noexcept {
     for (std::size_t j = 0; j < raw_.size(); ++j) memory_->stuck.corrected(j, filter.expected(static_cast<int>(j)));
     remember(time);
   }
+  note_offsets();
   if (is_blind_) input_findings_ |= reason::rejected;
   bool is_calm = input_findings_ == 0;
   for (std::size_t s = 0; s < sensors_.size(); ++s) {
@@ -358,6 +383,17 @@ SensorWatch::Finding SensorWatch::search_heading(const double* outputs) noexcept
   return {.release = false, .rebase = true};
 }
 
+/// Sensors whose values are off by what is known, and taken out of them.
+void SensorWatch::note_offsets() noexcept {
+  for (std::size_t s = 0; s < sensors_.size(); ++s) {
+    states_[s].offset = 0.0;
+    for (const int j : sensors_[s].outputs)
+      if (const double offset = memory_->offsets->offset(j); std::abs(offset) > std::abs(states_[s].offset))
+        states_[s].offset = offset;
+    if (states_[s].offset != 0.0) findings_[s] |= reason::off;
+  }
+}
+
 /// Largest nu' S^-1 nu of a sensor.
 double SensorWatch::limit(std::size_t sensor, Eigen::Index degrees) const noexcept {
   const bool is_suspect = records_[sensor].failures >= suspect_after;
@@ -373,6 +409,7 @@ void SensorWatch::find_stuck(double* outputs) noexcept {
     const std::vector<int>& all = sensors_[s].outputs;
     if (std::none_of(all.begin(), all.end(), [&](int j) { return memory_->stuck.is_stuck(j); })) continue;
     findings_[s] |= reason::stuck;
+    memory_->offsets->forget_onsets();
     ++states_[s].rejected;
     for (const int j : all) outputs[j] = Memory::unknown;
   }

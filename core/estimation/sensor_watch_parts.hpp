@@ -9,6 +9,7 @@
 #include <Eigen/Cholesky>
 
 #include "heading_search.hpp"
+#include "offset_watch.hpp"
 #include "rhec/core/estimation/sensor_watch.hpp"
 #include "stuck_values.hpp"
 #include "walking_filter.hpp"
@@ -51,6 +52,7 @@ struct SensorWatch::Memory {
   bool has_advanced = false;  ///< since the last samples
   bool was_calm = true;       ///< health was ok when the dispute began
   StuckValues stuck;
+  std::unique_ptr<OffsetWatch> offsets;
   std::unique_ptr<WalkingFilter> trial;   ///< for what is tried within one call
   std::unique_ptr<HeadingSearch> search;  ///< null for a vehicle without a heading
   /// The same, of a heading that may be wrong, while it is not known who is.

@@ -46,6 +46,7 @@ void WalkingFilter::predict(const double* inputs, double duration, const double*
       for (std::size_t j = 0; j < setup_.walk.size(); ++j)
         filter_.add_parameter_variance(static_cast<int>(j), ramp_variances_[j]);
     }
+    if (carried_) filter_.carry(*carried_);
     if (more_sigmas) limit_states();
   }
   for (std::size_t j = 0; more_sigmas && j < guess_.size(); ++j)

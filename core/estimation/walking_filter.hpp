@@ -43,6 +43,12 @@ class WalkingFilter {
   /// Whether an expected output depends on a state.
   bool depends_on(int output, int state) const noexcept;
   double expected(int output) const noexcept { return expected_[output]; }
+  /// Of an expected output by a state.
+  double derivative(int output, int state) const noexcept {
+    return jacobian_[static_cast<std::size_t>(state) * expected_.size() + output];
+  }
+  /// Takes columns (n x m) of small deviations of [x; p] along with each prediction; null: none.
+  void carry(Eigen::MatrixXd* deviations) noexcept { carried_ = deviations; }
 
  private:
   void limit_states() noexcept;
@@ -51,6 +57,7 @@ class WalkingFilter {
   KalmanFilter filter_;
   std::vector<double> ramp_variances_, guess_, expected_, jacobian_;
   Eigen::MatrixXd image_;  ///< P H'
+  Eigen::MatrixXd* carried_ = nullptr;
 };
 
 /// Largest value that a chi-square variable of this many degrees of freedom has with the probability of `sigmas`

@@ -41,7 +41,9 @@ struct Options {
   const char* blocking = "{size: 5, overlap: 3}";
   const char* solver = "{mode: rti}";
   int heading_starts = 1;
-  bool rates = false;  ///< of inputs, which the controller weighs and bounds
+  bool rates = false;    ///< of inputs, which the controller weighs and bounds
+  bool watched = false;  ///< measurements are judged, and one of them is off
+  int samples = 40;
 };
 
 std::unique_ptr<EstimationMethod> make_method(const std::shared_ptr<Model>& model, const Options& options) {
@@ -106,10 +108,21 @@ std::unique_ptr<EstimationMethod> make_method(const std::shared_ptr<Model>& mode
   return std::make_unique<FilterEstimation>(model, own);
 }
 
-/// Runs the closed loop for 40 samples; returns the number of allocations, from the first sample on.
+SensorWatch::Setup watch_setup() {
+  return {.noise = {.output_variances = {0.0009, 0.0009, 0.0003},
+                    .input_variances = {0.01, 0.01},
+                    .parameter_lower = {0.0, 0.0},
+                    .parameter_upper = {1.0, 1.0}},
+          .walk = {0.03, 0.03},
+          .parameter_sigmas = {1.0, 1.0}};
+}
+
+/// Runs the closed loop; returns the number of allocations, from the first sample on.
 long allocations_in_the_loop(const Options& options) {
   const std::shared_ptr<Model> model = host().make_model("bicycle_slip");
-  Estimator estimator(make_method(model, options));
+  auto watch = options.watched ? std::make_unique<SensorWatch>(model, watch_setup()) : nullptr;
+  Estimator estimator =
+      watch ? Estimator(make_method(model, options), {}, std::move(watch)) : Estimator(make_method(model, options));
   Controller::Setup setup;
   setup.problem.state_weights = {1.0, 1.0, 0.0, 0.0};
   setup.problem.input_weights = {5.0, 5.0};
@@ -130,10 +143,11 @@ long allocations_in_the_loop(const Options& options) {
   std::array<double, 3> outputs{};
   int fallbacks = 0;
   const long before = allocation_count();
-  for (int k = 0; k < 40; ++k) {
+  for (int k = 0; k < options.samples; ++k) {
     const double time = 0.2 * k;
     sensors.observe(vehicle.state().data(), outputs.data());
     if (k % 7 == 6) outputs[k % 3] = std::nan("");
+    if (options.watched && k >= 12) outputs[2] += 0.06;             // off by little
     if (k != 20) estimator.push_measurement(time, outputs.data());  // a gap
     const Estimate& estimate = estimator.estimate(time);
     fallbacks += estimate.fallback;
@@ -148,9 +162,10 @@ long allocations_in_the_loop(const Options& options) {
   }
   const long after = allocation_count();
   EXPECT_EQ(fallbacks, 0);
+  const double last = 0.2 * (options.samples - 1);
   EXPECT_GT(controller.follower().arc_length(), 15.0);
-  EXPECT_LT(std::hypot(estimator.estimate(7.8).state[0] - vehicle.state()[0],
-                       estimator.estimate(7.8).state[1] - vehicle.state()[1]),
+  EXPECT_LT(std::hypot(estimator.estimate(last).state[0] - vehicle.state()[0],
+                       estimator.estimate(last).state[1] - vehicle.state()[1]),
             2.0);
   return after - before;
 }
@@ -183,6 +198,11 @@ TEST(EstimationAllocation, NoneInTheClosedLoop) {
 }
 
 TEST(EstimationAllocation, NoneInTheClosedLoopOfAFilter) { EXPECT_EQ(allocations_in_the_loop({.filter = true}), 0); }
+
+TEST(EstimationAllocation, NoneWhereSensorsAreWatched) {
+  EXPECT_EQ(allocations_in_the_loop({.filter = true, .watched = true, .samples = 150}), 0);
+  EXPECT_EQ(allocations_in_the_loop({.bank = true, .watched = true, .samples = 150}), 0);
+}
 
 TEST(EstimationAllocation, NoneInTheClosedLoopOfABank) { EXPECT_EQ(allocations_in_the_loop({.bank = true}), 0); }
 

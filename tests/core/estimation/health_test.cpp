@@ -8,7 +8,7 @@ namespace rhec {
 namespace health_test {
 
 TEST(Health, InWords) {
-  const std::vector<Sensor> sensors{{"x_gps and y_gps", {0, 1}}, {"delta", {2}}};
+  const std::vector<Sensor> sensors{{"x_gps and y_gps", {0, 1}}, {"delta", {2}, "rad"}};
   Health health;
   health.sensors.resize(2);
   EXPECT_EQ(in_words(health, sensors), "ok");
@@ -16,6 +16,10 @@ TEST(Health, InWords) {
   health.sensors[0].reasons = reason::rejected | reason::moved;
   health.inputs.reasons = reason::implausible;
   EXPECT_EQ(in_words(health, sensors), "degraded: x_gps and y_gps rejected and moved; inputs implausible");
+  health.sensors[1] = {.reasons = reason::off, .accepted = 3, .rejected = 0, .offset = -0.0517};
+  EXPECT_EQ(in_words(health, sensors),
+            "degraded: x_gps and y_gps rejected and moved; delta off by about -0.052 rad; inputs implausible");
+  health.sensors[1] = {};
   health = {.level = HealthLevel::lost, .reasons = reason::uncertain, .sensors = health.sensors, .inputs = {}};
   EXPECT_EQ(in_words(health, sensors), "lost: uncertain; x_gps and y_gps rejected and moved");
 }

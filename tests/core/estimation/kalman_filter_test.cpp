@@ -103,6 +103,25 @@ TEST(KalmanFilter, GuessesAnInputThatIsMissingAndTrustsItLittle) {
   EXPECT_GT(without.covariance(1, 1), with.covariance(1, 1) + 100.0);
 }
 
+TEST(KalmanFilter, CarriesDeviationsAsItMovesTheMean) {
+  const auto model = linear_model<Hovercraft>();
+  const double inputs[] = {0.3, -0.2}, zeros[] = {0.0, 0.0};
+  KalmanFilter filter = filter_for(model);
+  const Eigen::Index n = filter.mean.size();
+  Eigen::MatrixXd deviations = 0.1 * Eigen::MatrixXd::Random(n, 3), moved = deviations;
+  std::vector<Eigen::VectorXd> ends;
+  for (Eigen::Index m = 0; m < moved.cols(); ++m) {
+    KalmanFilter other = filter_for(model);
+    other.mean += deviations.col(m);
+    other.predict(inputs, zeros, 0.2);
+    ends.push_back(other.mean);
+  }
+  filter.predict(inputs, zeros, 0.2);
+  filter.carry(moved);
+  for (Eigen::Index m = 0; m < moved.cols(); ++m)
+    EXPECT_LT((filter.mean + moved.col(m) - ends[static_cast<std::size_t>(m)]).norm(), 1e-12) << m;
+}
+
 TEST(KalmanFilter, RestartsAParameterAsIfNothingWereKnownOfIt) {
   const auto model = linear_model<Boat>();
   KalmanFilter filter = filter_for(model);

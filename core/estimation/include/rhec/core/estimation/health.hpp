@@ -27,7 +27,8 @@ inline constexpr std::uint32_t moved = 1u << 4;        ///< it has jumped for go
 inline constexpr std::uint32_t clock = 1u << 5;        ///< a stamp that cannot be, or a clock that was set
 inline constexpr std::uint32_t uncertain = 1u << 6;    ///< a standard deviation above the limit
 inline constexpr std::uint32_t starting = 1u << 7;     ///< no measurement yet, or the heading is being searched
-inline constexpr std::uint32_t all[] = {rejected, stuck, silent, implausible, moved, clock, uncertain, starting};
+inline constexpr std::uint32_t off = 1u << 8;          ///< its values are off by a constant, which is taken out of them
+inline constexpr std::uint32_t all[] = {rejected, stuck, silent, implausible, moved, clock, uncertain, starting, off};
 }  // namespace reason
 
 /// Of one sensor, or of the measured inputs.
@@ -35,6 +36,8 @@ struct SensorHealth {
   std::uint32_t reasons = 0;  ///< at present; 0: none
   std::int64_t accepted = 0;  ///< measurements since the start
   std::int64_t rejected = 0;  ///< likewise
+  /// What is taken out of its values, in their unit; of several outputs the largest. 0: nothing.
+  double offset = 0.0;
 };
 
 /// Of an estimate.

@@ -76,6 +76,9 @@ class RHEC_EXPORT KalmanFilter {
   /// Restarts a parameter: it keeps its mean and gets this variance, without correlation to anything else.
   void restart_parameter(int parameter, double variance) noexcept;
 
+  /// Moves small deviations of [x; p] (columns, n x m) on as the last prediction by a duration has moved the mean.
+  void carry(Eigen::MatrixXd& deviations) noexcept;
+
   /// The noise of a measured input, or of an output, from now on.
   void set_input_variance(int input, double variance) noexcept { noise_.input_variances[input] = variance; }
   void set_output_variance(int output, double variance) noexcept { noise_.output_variances[output] = variance; }

@@ -12,6 +12,7 @@ namespace rhec {
 struct Sensor {
   std::string name;          ///< of its outputs, e.g. "x_gps and y_gps"
   std::vector<int> outputs;  ///< indices of the model's outputs, in their order
+  std::string unit = {};     ///< of these
 };
 
 /// A sensor has at most so many outputs; further ones that are like them make another one.

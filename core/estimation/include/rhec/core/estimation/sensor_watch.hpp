@@ -99,8 +99,8 @@ class RHEC_EXPORT SensorWatch {
   /// with an input (n_u), each of which may be off by `input_sigmas` besides its noise (n_u, or null).
   void predict(double duration, const double* inputs, const double* input_sigmas, Estimate& estimate) noexcept;
 
-  /// Whether measurements are held back that slip which has jumped would explain, so that estimates are to be widened.
-  bool is_in_doubt() const noexcept { return slip_probability_ > 0.0; }
+  /// Whether estimates are to be widened: slip may have jumped, or a sensor is off.
+  bool is_in_doubt() const noexcept;
   /// Gives an estimate at the last sample the covariance that it has if slip may have jumped, with the probability w
   /// that the likelihoods of the measurements say: (1 - w) P + w (P1 + d d'), where P1 and d are the covariance with
   /// such slip and how far its mean is from that of the estimate (moments of a mixture; Bar-Shalom, Li and Kirubarajan
@@ -160,7 +160,9 @@ class RHEC_EXPORT SensorWatch {
   bool sees_position(const std::vector<int>& outputs) const noexcept;
   bool is_position_disputed() const noexcept, is_place_lost() const noexcept, is_placed_otherwise() const noexcept;
   bool may_follow() const noexcept;
+  bool is_within_bounds(const WalkingFilter& filter) const noexcept;
   void test_inputs(const double* outputs) noexcept;
+  void note_offsets() noexcept;
   void remember(double time) noexcept;
   void note_volume(const Estimate& estimate) noexcept;
   double limit(std::size_t sensor, Eigen::Index degrees) const noexcept;

@@ -1,0 +1,243 @@
+// Sensors that are off by little for long: who finds it, what it does to an estimate, and what is said of it.
+#include "core/estimation/offset_watch.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <numbers>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "support/linear_case.hpp"
+#include "support/sensor_faults.hpp"
+
+namespace rhec {
+namespace offset_watch_test {
+
+using namespace rhec::testing;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+constexpr double gate = 6.0, offset = 0.3;
+constexpr int rate = 1;  // the output that is watched
+
+/// A boat that is measured, by a filter beside which offsets of its second output are watched.
+struct WatchedBoat {
+  std::shared_ptr<const Model> model = linear_model<Boat>();
+  KalmanFilter::Noise noise{
+      .output_variances = {0.04, 0.01}, .input_variances = {1e-4}, .parameter_lower = {-1e3}, .parameter_upper = {1e3}};
+  WalkingFilter filter;
+  OffsetWatch watch{*model, {rate}, noise, gate};
+
+  explicit WatchedBoat(double walk = 0.01)
+      : filter(model, {.noise = noise, .walk = {walk}, .step = 0.1, .substeps = 4}) {
+    filter.mean() = initial_mean(*model);
+    filter.covariance() = 0.01 * Eigen::MatrixXd::Identity(4, 4);
+    if (walk == 0.0) filter.covariance()(3, 3) = 0.0;
+  }
+  void take(std::vector<double> outputs) {
+    const double input = 0.2;
+    watch.correct(outputs.data());
+    filter.carry(&watch.sensitivities());
+    filter.predict(&input, 0.1);
+    filter.expect();
+    watch.take(filter, outputs.data(), 1.0);
+    filter.update(outputs.data());
+  }
+  Estimate estimate() {
+    Estimate estimate;
+    estimate.state = filter.mean().head(3);
+    estimate.parameters = filter.mean().tail(1);
+    estimate.covariance = filter.covariance();
+    return estimate;
+  }
+};
+
+/// What is measured of a boat that moves as its filter expects.
+struct TrueBoat {
+  WatchedBoat boat;
+  std::mt19937_64 random{7};
+  std::normal_distribution<double> normal;
+  std::vector<double> measure(double noise_factor, double off) {
+    const double input = 0.2;
+    boat.filter.predict(&input, 0.1);
+    boat.filter.expect();
+    return {boat.filter.expected(0) + noise_factor * 0.2 * normal(random),
+            boat.filter.expected(1) + noise_factor * 0.1 * normal(random) + off};
+  }
+};
+
+/// Without noise, what is said of the offset, and of what it has done to the estimate, is exact.
+TEST(OffsetWatch, TakesOutWhatAnOffsetHasDone) {
+  TrueBoat truth;
+  WatchedBoat misled, told;
+  bool is_found = false;
+  for (int k = 0; k < 200 && !is_found; ++k) {
+    const double off = k < 30 ? 0.0 : offset;
+    std::vector<double> outputs = truth.measure(0.0, off);
+    misled.take(outputs);
+    outputs[rate] -= off;
+    told.take(outputs);
+    is_found = misled.watch.has_suspect();
+    EXPECT_TRUE(!is_found || k >= 30) << k;
+  }
+  ASSERT_TRUE(is_found);
+  EXPECT_GT((misled.filter.mean() - told.filter.mean()).norm(), 0.05);
+  misled.watch.adopt_suspected(misled.filter);
+  EXPECT_NEAR(misled.watch.offset(rate), offset, 1e-9);
+  EXPECT_LT((misled.filter.mean() - told.filter.mean()).norm(), 1e-9);
+  EXPECT_EQ(misled.watch.offset(0), 0.0);
+}
+
+TEST(OffsetWatch, FindsNoneInWhiteNoise) {
+  TrueBoat truth;
+  WatchedBoat boat;
+  for (int k = 0; k < 20000; ++k) {
+    boat.take(truth.measure(1.0, 0.0));
+    ASSERT_FALSE(boat.watch.has_suspect()) << k;
+  }
+}
+
+TEST(OffsetWatch, FindsOneAsFastAsTheDataTell) {
+  TrueBoat truth;
+  WatchedBoat boat;
+  int found = -1;
+  for (int k = 0; k < 200 && found < 0; ++k) {
+    boat.take(truth.measure(1.0, k < 50 ? 0.0 : offset));
+    if (boat.watch.has_suspect()) found = k;
+  }
+  EXPECT_GE(found, 50);
+  EXPECT_LE(found, 110);
+}
+
+/// One that was there before the first sample has no onset that shows; where the current is known, positions tell.
+TEST(OffsetWatch, FindsOneThatHasAlwaysBeenThere) {
+  TrueBoat truth;
+  WatchedBoat boat(0.0);
+  bool is_found = false;
+  for (int k = 0; k < 300 && !is_found; ++k) {
+    boat.take(truth.measure(1.0, offset));
+    is_found = boat.watch.has_suspect();
+    if (k == 20) boat.watch.forget_onsets();
+  }
+  EXPECT_TRUE(is_found);
+}
+
+TEST(OffsetWatch, WithdrawsWhatLaterSamplesDoNotConfirm) {
+  TrueBoat truth;
+  WatchedBoat boat;
+  boat.watch.adopt(rate, offset, 0.05 * 0.05);
+  EXPECT_TRUE(boat.watch.has_any());
+  EXPECT_NEAR(boat.watch.offset(rate), offset, 1e-12);
+  for (int k = 0; k < 300 && boat.watch.has_any(); ++k) {
+    boat.take(truth.measure(1.0, 0.0));
+    if (boat.watch.has_suspect()) boat.watch.adopt_suspected(boat.filter);
+  }
+  EXPECT_FALSE(boat.watch.has_any());
+  EXPECT_EQ(boat.watch.offset(rate), 0.0);
+}
+
+/// An offset of which half was adopted: what is given out is nearer to the truth than the filter, and says how far it
+/// may be off.
+TEST(OffsetWatch, GivesOutWhatIsLeftOfAnOffset) {
+  TrueBoat truth;
+  WatchedBoat boat, told;
+  boat.watch.adopt(rate, 0.5 * offset, 1.0);
+  EXPECT_FALSE(boat.watch.has_any());  // less than its own uncertainty is none
+  boat.watch.adopt(rate, 0.8 * offset, 0.03 * 0.03);
+  for (int k = 0; k < 40; ++k) {
+    std::vector<double> outputs = truth.measure(0.0, offset);
+    boat.take(outputs);
+    outputs[rate] -= offset;
+    told.take(outputs);
+  }
+  ASSERT_TRUE(boat.watch.has_any());
+  Estimate estimate = boat.estimate();
+  const double before = (estimate.state - told.filter.mean().head(3)).norm();
+  boat.watch.refine(estimate);
+  EXPECT_LT((estimate.state - told.filter.mean().head(3)).norm(), 0.8 * before);
+  EXPECT_GT(estimate.covariance(1, 1), boat.filter.covariance()(1, 1));
+}
+
+TEST(OffsetWatch, WithdrawsWhatWasAdoptedOfLate) {
+  TrueBoat truth;
+  WatchedBoat boat, told;
+  boat.watch.adopt(rate, offset, 0.03 * 0.03);
+  EXPECT_TRUE(boat.watch.has_recent());
+  for (int k = 0; k < 60; ++k) {
+    const std::vector<double> outputs = truth.measure(0.0, 0.0);
+    boat.take(outputs);
+    told.take(outputs);
+  }
+  const double before = (boat.filter.mean() - told.filter.mean()).norm(), variance = boat.filter.covariance()(1, 1);
+  EXPECT_GT(before, 0.1);
+  boat.watch.withdraw_recent(boat.filter);
+  EXPECT_FALSE(boat.watch.has_any());
+  EXPECT_LT((boat.filter.mean() - told.filter.mean()).norm(), 0.1 * before);
+  EXPECT_GT(boat.filter.covariance()(1, 1), variance);
+}
+
+// ---- an estimator that has it
+
+struct OffsetFaults : SensorFaults {};
+INSTANTIATE_TEST_SUITE_P(All, OffsetFaults, ::testing::Values("ekf", "bank", "rhe"), name_of_estimator);
+
+constexpr double little = 3.0 * std::numbers::pi / 180.0;
+
+/// The size that is said; NaN where none is.
+double size_in(const std::string& words) {
+  const std::string before = "delta off by about ";
+  const std::size_t at = words.find(before);
+  return at == std::string::npos ? nan : std::stod(words.substr(at + before.size()));
+}
+
+TEST_P(OffsetFaults, AnAngleThatIsOffByLittleIsFoundAndTakenOut) {
+  int found = 0, episodes = 0;
+  double honest = 0.0;
+  for (const double size : {little, -little}) {
+    const Fault fault{.spoil = [=](Delivery& d) { d.outputs[2] += size; }, .length = 150};
+    for (int seed = 1; seed <= seeds; ++seed, ++episodes) {
+      SCOPED_TRACE(::testing::Message() << size << ", seed " << seed);
+      const Episode episode = drive_with_fault(vehicle, fault, static_cast<std::uint64_t>(seed));
+      EXPECT_TRUE(episode.is_finite);
+      EXPECT_GE(episode.honest_share(), 0.92);
+      honest += episode.honest_share();
+      const auto first = std::ranges::find_if(
+          episode.during, [](const Episode::Sample& sample) { return !std::isnan(size_in(sample.words)); });
+      if (first == episode.during.end()) continue;
+      ++found;
+      EXPECT_LE(first - episode.during.begin(), 100);
+      // Beside slip that scales the angle, it is known roughly.
+      EXPECT_GT(size_in(first->words) / size, 0.4);
+      EXPECT_LT(size_in(first->words) / size, 2.5);
+      EXPECT_EQ(first->health, HealthLevel::degraded);
+    }
+  }
+  EXPECT_GE(found, 7);
+  EXPECT_GE(honest / episodes, 0.95);
+}
+
+TEST_P(OffsetFaults, AnAngleThatIsRightAgainIsBelieved) {
+  const Fault fault{.spoil = [](Delivery& d) { d.outputs[2] += little; }, .length = 100};
+  for (int seed = 1; seed <= seeds; ++seed) {
+    SCOPED_TRACE(seed);
+    const Episode episode = drive_with_fault(vehicle, fault, static_cast<std::uint64_t>(seed), 200);
+    EXPECT_LE(episode.samples_to_ok(), 120);
+  }
+}
+
+TEST_P(OffsetFaults, NoneIsFoundWhereThereIsNone) {
+  const Fault none{.spoil = [](Delivery&) {}, .length = 300};
+  for (int seed = 11; seed <= 30; ++seed) {
+    SCOPED_TRACE(seed);
+    const Episode episode = drive_with_fault(vehicle, none, static_cast<std::uint64_t>(seed));
+    for (const Episode::Sample& sample : episode.during) ASSERT_THAT(sample.words, Not(HasSubstr("off")));
+  }
+}
+
+}  // namespace offset_watch_test
+}  // namespace rhec
