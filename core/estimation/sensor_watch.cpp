@@ -81,7 +81,7 @@ SensorWatch::SensorWatch(std::shared_ptr<const Model> model, const Setup& setup)
   std::vector<int> watched;  // where the vehicle is, an offset does not show
   own_->filter.expect();
   for (int j = 0; j < model->output_count(); ++j)
-    if (!sees_position(j)) watched.push_back(j);
+    if (setup_.offsets && !sees_position(j)) watched.push_back(j);
   memory_->offsets = std::make_unique<OffsetWatch>(*model, watched, setup_.noise, offset_gate);
   if (model->description().roles.heading >= 0)
     for (auto* each : {&memory_->search, &memory_->second_thought})

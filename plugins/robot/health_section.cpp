@@ -13,6 +13,9 @@ const OptionTable<HealthOptions>& HealthOptions::table() {
       OptionTable<H>()
           .flag("watch", &H::watch,
                 "whether stamps, inputs and measurements are judged before they are used; false: all are trusted")
+          .flag("offsets", &H::offsets,
+                "whether angles and the like that are off by little for long are found, and what they are off by taken "
+                "out of what is measured")
           .number("gate", &H::gate, "a measurement that is less probable than so many standard deviations is not used",
                   greater_than(0.0))
           .integer("proof", &H::proof, "samples that a sensor must have jumped for before the estimate follows it",
@@ -36,6 +39,7 @@ std::unique_ptr<SensorWatch> make_watch(const HealthOptions& options, const Esti
   setup.has_ramps = senses_motion(*context.model);
   setup.step = context.step;
   setup.substeps = parts.substeps;
+  setup.offsets = options.offsets;
   setup.gate = options.gate;
   setup.proof = options.proof;
   setup.lost_position = options.lost_position;

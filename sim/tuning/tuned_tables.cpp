@@ -57,8 +57,11 @@ std::vector<Tunable> TunedTables::tunables(const Settings& settings, const Tunin
   return tunables_of(host_, LogScenario(host_, settings), wishes);
 }
 
+/// What sensors are off by is what is tuned: nobody takes it out of them.
 std::vector<Innovation> TunedTables::innovations(const Settings& settings, const HoldOut& withheld) const {
-  const LogScenario scenario(host_, settings);
+  Settings as_measured = settings;
+  as_measured.set("estimator.health.offsets", Settings::scalar("false"));
+  const LogScenario scenario(host_, as_measured);
   return sim::innovations(scenario.variants().front().robot, recorded_log(tables_, scenario), scenario.log(), withheld);
 }
 

@@ -55,6 +55,7 @@ class OptionTable {
       return leaf(std::move(name), member, ChoiceValue<Enum>{std::move(choices)}, std::move(meaning));
     } else {
       std::vector<std::pair<std::string, long long>> numbered;
+      numbered.reserve(choices.size());
       for (auto& [called, value] : choices) numbered.emplace_back(std::move(called), static_cast<long long>(value));
       return entry(
           std::move(name), member,

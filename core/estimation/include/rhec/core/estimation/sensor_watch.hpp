@@ -50,6 +50,7 @@ class RHEC_EXPORT SensorWatch {
     /// The same of a sensor that the estimate has followed: one that comes back as a transient does is then still
     /// doubted.
     int calm_after_moving = 10;
+    bool offsets = true;         ///< whether sensors that are off by little for long are found and corrected
     double lost_position = 3.0;  ///< standard deviation above which the vehicle is lost [m]
     double lost_heading = 0.5;   ///< likewise [rad]
   };
