@@ -7,8 +7,13 @@ namespace rhec {
 std::vector<Sensor> sensors_of(const ModelDescription& about, const std::vector<double>& output_variances) {
   std::vector<Sensor> sensors;
   for (int j = 0; j < static_cast<int>(about.outputs.size()); ++j) {
+    // One device measures nothing twice.
+    const auto measures_it = [&](int other) {
+      return !about.outputs[j].meaning.empty() && about.outputs[other].meaning == about.outputs[j].meaning;
+    };
     const auto has_output = [&](const Sensor& sensor) {
       const int first = sensor.outputs.front();
+      if (std::ranges::any_of(sensor.outputs, measures_it)) return false;
       return about.outputs[first].unit == about.outputs[j].unit && output_variances[first] == output_variances[j] &&
              sensor.outputs.size() < most_sensor_outputs;
     };

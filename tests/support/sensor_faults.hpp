@@ -34,12 +34,12 @@ inline Robot watched_robot(const std::string& estimator, const std::string& more
   return {host(), RobotOptions::table().parse(watched_settings(estimator, more), "robot")};
 }
 
-/// The same with a second receiver, that of outputs 3 and 4, with ten times the noise of the first.
-inline Robot with_two_receivers(const std::string& estimator) {
+/// The same with a second receiver, that of outputs 3 and 4, with this noise [m].
+inline Robot with_two_receivers(const std::string& estimator, const std::string& noise) {
   Settings settings = watched_settings(estimator, "");
   apply_assignment(settings, "model.outputs=[x_gps, y_gps, delta, {x_rough: x_gps}, {y_rough: y_gps}]");
-  for (const char* noise : {"noise.outputs.x_rough=0.3", "noise.outputs.y_rough=0.3"})
-    apply_assignment(settings, noise);
+  for (const char* output : {"x_rough", "y_rough"})
+    apply_assignment(settings, std::string("noise.outputs.") + output + "=" + noise);
   return {host(), RobotOptions::table().parse(settings, "robot")};
 }
 

@@ -23,6 +23,18 @@ TEST(Sensors, OutputsOfOneUnitAndNoiseAreOneSensor) {
   EXPECT_EQ(sensors[2].outputs, (std::vector<int>{3}));
 }
 
+TEST(Sensors, WhatIsMeasuredTwiceIsSeenByTwo) {
+  ModelDescription about;
+  for (const char* name : {"x", "y", "x_2", "y_2"}) {
+    about.outputs.push_back(variable(name, "m"));
+    about.outputs.back().meaning = name[0] == 'x' ? "GPS antenna, x" : "GPS antenna, y";
+  }
+  const std::vector<Sensor> sensors = sensors_of(about, {0.01, 0.01, 0.01, 0.01});
+  ASSERT_EQ(sensors.size(), 2u);
+  EXPECT_EQ(sensors[0].outputs, (std::vector<int>{0, 1}));
+  EXPECT_EQ(sensors[1].name, "x_2 and y_2");
+}
+
 TEST(Sensors, NoSensorHasMoreOutputsThanFit) {
   ModelDescription about;
   about.outputs.assign(2 * most_sensor_outputs + 1, variable("y", "m"));

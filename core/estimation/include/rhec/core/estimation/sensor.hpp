@@ -18,7 +18,8 @@ struct Sensor {
 /// A sensor has at most so many outputs; further ones that are like them make another one.
 inline constexpr int most_sensor_outputs = 6;
 
-/// The sensors of a model: outputs of one unit and one stated variance, like the coordinates of a position, are one.
+/// The sensors of a model: outputs of one unit and one stated variance, like the coordinates of a position, are one;
+/// those of one meaning, such as those of two receivers, are not.
 /// `output_variances`: n_y.
 RHEC_EXPORT std::vector<Sensor> sensors_of(const ModelDescription& about, const std::vector<double>& output_variances);
 
