@@ -40,7 +40,7 @@ OffsetWatch::OffsetWatch(const Model& model, std::vector<int> outputs, const Kal
       limit_(gate * gate) {
   const Eigen::Index n = model.state_count() + model.parameter_count();
   for (const Variable& each : model.description().outputs) is_angle_.push_back(each.is_angle);
-  onsets_.resize(outputs_.size() + most_onsets);
+  if (!outputs_.empty()) onsets_.resize(outputs_.size() + most_onsets);
   known_.resize(is_angle_.size());
   sensitivities_ = Eigen::MatrixXd::Zero(n, std::ssize(onsets_) + std::ssize(outputs_));
   covariance_ = Eigen::MatrixXd::Zero(n, n);
@@ -137,6 +137,7 @@ void OffsetWatch::widen(const WalkingFilter& filter, const Sensor& sensor, const
 
 /// One output after the other, as the filter does it: innovations of a sample are then independent.
 void OffsetWatch::take(const WalkingFilter& filter, const double* outputs, double excess) noexcept {
+  if (outputs_.empty()) return;
   const int nx = filter.model().state_count(), ny = filter.model().output_count();
   covariance_ = filter.covariance();
   correction_.setZero();

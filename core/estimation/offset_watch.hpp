@@ -32,7 +32,7 @@ class OffsetWatch {
 
   /// Takes offsets that are known out of outputs (n_y).
   void correct(double* outputs) const noexcept;
-  /// Columns that go along with the filter's predictions (`WalkingFilter::carry`).
+  /// Columns that go along with the filter's predictions (`WalkingFilter::predict`).
   Eigen::MatrixXd& sensitivities() noexcept { return sensitivities_; }
   /// What is not known of offsets that were adopted makes an innovation of a sensor's outputs (n_y) wider.
   void widen(const WalkingFilter& filter, const Sensor& sensor, const double* outputs, Innovation& innovation) noexcept;

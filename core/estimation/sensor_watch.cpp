@@ -189,9 +189,7 @@ void SensorWatch::advance(double duration, const double* inputs, const double* m
     own_->filter.mean() = blind_->filter.mean();
     own_->filter.covariance() = blind_->filter.covariance();
   } else {
-    own_->filter.carry(&memory_->offsets->sensitivities());
-    own_->filter.predict(inputs, duration);
-    own_->filter.carry(nullptr);
+    own_->filter.predict(inputs, duration, nullptr, &memory_->offsets->sensitivities());
   }
   if (!is_disputed_) return;
   if (slip_->is_active) slip_->filter.predict(inputs, duration);

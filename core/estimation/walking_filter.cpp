@@ -30,7 +30,8 @@ WalkingFilter::WalkingFilter(std::shared_ptr<const Model> model, const Setup& se
   image_ = Eigen::MatrixXd::Zero(m.state_count(), m.output_count());
 }
 
-void WalkingFilter::predict(const double* inputs, double duration, const double* more_sigmas) noexcept {
+void WalkingFilter::predict(const double* inputs, double duration, const double* more_sigmas,
+                            Eigen::MatrixXd* deviations) noexcept {
   if (!(duration > 0.0) || !std::isfinite(duration)) return;
   const int parts =
       static_cast<int>(std::min<double>(most_parts, std::max(1.0, std::ceil(duration / setup_.step - 1e-6))));
@@ -46,7 +47,7 @@ void WalkingFilter::predict(const double* inputs, double duration, const double*
       for (std::size_t j = 0; j < setup_.walk.size(); ++j)
         filter_.add_parameter_variance(static_cast<int>(j), ramp_variances_[j]);
     }
-    if (carried_) filter_.carry(*carried_);
+    if (deviations) filter_.carry(*deviations);
     if (more_sigmas) limit_states();
   }
   for (std::size_t j = 0; more_sigmas && j < guess_.size(); ++j)

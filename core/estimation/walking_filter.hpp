@@ -28,8 +28,10 @@ class WalkingFilter {
   const Model& model() const noexcept { return filter_.model(); }
 
   /// Predicts by `duration` [s] in parts of at most a step, with an input (n_u) that holds all the while.
-  /// `more_sigmas` (n_u, or null): of each part's inputs besides their noise.
-  void predict(const double* inputs, double duration, const double* more_sigmas = nullptr) noexcept;
+  /// `more_sigmas` (n_u, or null): of each part's inputs besides their noise. `deviations` (n x m, or null): columns of
+  /// small deviations of [x; p] that are taken along.
+  void predict(const double* inputs, double duration, const double* more_sigmas = nullptr,
+               Eigen::MatrixXd* deviations = nullptr) noexcept;
   /// Uses outputs (n_y, NaN where missing).
   void update(const double* outputs) noexcept { filter_.update(outputs, nullptr); }
   /// Makes a parameter anew: its mean stays, with this standard deviation.
@@ -47,8 +49,6 @@ class WalkingFilter {
   double derivative(int output, int state) const noexcept {
     return jacobian_[static_cast<std::size_t>(state) * expected_.size() + output];
   }
-  /// Takes columns (n x m) of small deviations of [x; p] along with each prediction; null: none.
-  void carry(Eigen::MatrixXd* deviations) noexcept { carried_ = deviations; }
 
  private:
   void limit_states() noexcept;
@@ -57,7 +57,6 @@ class WalkingFilter {
   KalmanFilter filter_;
   std::vector<double> ramp_variances_, guess_, expected_, jacobian_;
   Eigen::MatrixXd image_;  ///< P H'
-  Eigen::MatrixXd* carried_ = nullptr;
 };
 
 /// Largest value that a chi-square variable of this many degrees of freedom has with the probability of `sigmas`

@@ -42,8 +42,7 @@ struct WatchedBoat {
   void take(std::vector<double> outputs) {
     const double input = 0.2;
     watch.correct(outputs.data());
-    filter.carry(&watch.sensitivities());
-    filter.predict(&input, 0.1);
+    filter.predict(&input, 0.1, nullptr, &watch.sensitivities());
     filter.expect();
     watch.take(filter, outputs.data(), 1.0);
     filter.update(outputs.data());
