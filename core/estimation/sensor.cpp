@@ -7,14 +7,10 @@ namespace rhec {
 std::vector<Sensor> sensors_of(const ModelDescription& about, const std::vector<double>& output_variances) {
   std::vector<Sensor> sensors;
   for (int j = 0; j < static_cast<int>(about.outputs.size()); ++j) {
-    // One device measures nothing twice.
-    const auto measures_it = [&](int other) {
-      return !about.outputs[j].meaning.empty() && about.outputs[other].meaning == about.outputs[j].meaning;
-    };
     const auto has_output = [&](const Sensor& sensor) {
       const int first = sensor.outputs.front();
-      if (std::ranges::any_of(sensor.outputs, measures_it)) return false;
-      return about.outputs[first].unit == about.outputs[j].unit && output_variances[first] == output_variances[j] &&
+      return about.outputs[first].unit == about.outputs[j].unit &&
+             about.outputs[first].device == about.outputs[j].device && output_variances[first] == output_variances[j] &&
              sensor.outputs.size() < most_sensor_outputs;
     };
     const auto found = std::find_if(sensors.begin(), sensors.end(), has_output);

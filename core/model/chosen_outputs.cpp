@@ -33,7 +33,10 @@ class ChosenOutputs final : public Model {
     description_.outputs.clear();
     for (std::size_t j = 0; j < chosen_.size(); ++j) {
       description_.outputs.push_back(model_->description().outputs[chosen_[j]]);
-      if (!names.empty() && !names[j].empty()) description_.outputs.back().name = names[j];
+      Variable& output = description_.outputs.back();
+      if (!names.empty() && !names[j].empty()) output.name = names[j];
+      const auto here = chosen_.begin() + static_cast<std::ptrdiff_t>(j);
+      output.device = static_cast<std::uint8_t>(output.device + std::count(chosen_.begin(), here, chosen_[j]));
     }
     if (const VehicleGraph* all = model_->graph()) graph_ = formula_copy(*all, chosen_);
   }

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <string>
+
 namespace rhec {
 namespace sensor_test {
 
@@ -27,7 +29,7 @@ TEST(Sensors, WhatIsMeasuredTwiceIsSeenByTwo) {
   ModelDescription about;
   for (const char* name : {"x", "y", "x_2", "y_2"}) {
     about.outputs.push_back(variable(name, "m"));
-    about.outputs.back().meaning = name[0] == 'x' ? "GPS antenna, x" : "GPS antenna, y";
+    about.outputs.back().device = std::string(name).ends_with("_2");
   }
   const std::vector<Sensor> sensors = sensors_of(about, {0.01, 0.01, 0.01, 0.01});
   ASSERT_EQ(sensors.size(), 2u);

@@ -80,6 +80,8 @@ TEST(ChosenOutputs, MayBeThereTwiceUnderAnotherName) {
   const auto twice = model_with("outputs: [x_trailer_gps, articulation, {x_rough: x_trailer_gps}]");
   ASSERT_THAT(names_of(twice->description().outputs), ElementsAre("x_trailer_gps", "articulation", "x_rough"));
   EXPECT_EQ(twice->description().outputs[2].unit, "m");
+  EXPECT_EQ(twice->description().outputs[0].device, 0);
+  EXPECT_EQ(twice->description().outputs[2].device, 1);
   const std::size_t nx = once->state_count();
   for (const std::string& set : twice->instruction_sets()) {
     for (const auto& model : {once, twice}) ASSERT_TRUE(model->use_instruction_set(set));

@@ -19,7 +19,7 @@ struct Sensor {
 inline constexpr int most_sensor_outputs = 6;
 
 /// The sensors of a model: outputs of one unit and one stated variance, like the coordinates of a position, are one;
-/// those of one meaning, such as those of two receivers, are not.
+/// those of several devices (`Variable::device`), such as two receivers, are not.
 /// `output_variances`: n_y.
 RHEC_EXPORT std::vector<Sensor> sensors_of(const ModelDescription& about, const std::vector<double>& output_variances);
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <limits>
 #include <string>
 #include <vector>
@@ -23,6 +24,8 @@ struct Variable {
   bool is_angle = false;  ///< differences are taken on the circle
   double nominal = 1.0;   ///< of a parameter: its value without slip
   bool usual = true;      ///< of an output: measured by default
+  /// Of an output: how many before it measure the same (`with_outputs`); each is of another device.
+  std::uint8_t device = 0;
 };
 
 /// The names of variables, in their order.
