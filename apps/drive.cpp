@@ -24,7 +24,11 @@ namespace {
 void print_signals(const logs::Drive& drive) {
   fmt::print("{:<18} {:>8} {:>8} {:>8}   {}\n", "SIGNAL", "VALUES", "MISSING", "LEFT OUT", "FROM");
   for (const logs::SignalCount& each : drive.signals)
-    fmt::print("{:<18} {:>8} {:>8} {:>8}   {}\n", each.variable, each.values, each.missing, each.left_out, each.source);
+    fmt::print("{:<18} {:>8} {:>8} {:>8}   {}{}\n", each.variable, each.values, each.missing, each.left_out,
+               each.source,
+               each.stated == 0 ? ""
+                                : fmt::format("; {} state how accurate they are, {:.3g} to {:.3g}", each.stated,
+                                              each.least_sigma, each.most_sigma));
   if (drive.origin)
     fmt::print("local plane: origin {:.8f}, {:.8f} degrees, {:.3f} m\n", drive.origin->latitude,
                drive.origin->longitude, drive.origin->height);

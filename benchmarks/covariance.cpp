@@ -52,8 +52,8 @@ class TimedMethod final : public EstimationMethod {
       : method_(std::move(method)), times_(std::move(times)) {}
   const Model& model() const noexcept override { return method_->model(); }
   int substeps() const noexcept override { return method_->substeps(); }
-  void start(const double* outputs) noexcept override { method_->start(outputs); }
-  void add(const MeasuredInterval& interval, const double* outputs) noexcept override {
+  void start(Measured outputs) noexcept override { method_->start(outputs); }
+  void add(const MeasuredInterval& interval, Measured outputs) noexcept override {
     const auto begin = Ticks::now();
     method_->add(interval, outputs);
     times_->add_node.push_back(Ticks::microseconds(begin, Ticks::now()));

@@ -68,12 +68,12 @@ class Forwarding final : public EstimationMethod {
         random_(static_cast<std::uint64_t>(trouble.seed), "outliers") {}
   const Model& model() const noexcept override { return inner_->model(); }
   int substeps() const noexcept override { return inner_->substeps(); }
-  void start(const double* outputs) noexcept override {
+  void start(Measured outputs) noexcept override {
     inner_->start(outputs);
     time_ = 0.0;
     for (Beside& other : others_) other.estimator->push_measurement(time_, outputs);
   }
-  void add(const MeasuredInterval& interval, const double* outputs) noexcept override {
+  void add(const MeasuredInterval& interval, Measured outputs) noexcept override {
     inner_->add(interval, outputs);
     const double now = time_ + interval.duration;
     Late sample{now, std::vector<double>(outputs, outputs + model().output_count()), {}};

@@ -56,7 +56,7 @@ ArrivalCost::ArrivalCost(ArrivalKind kind, const RheProblem& like, std::vector<P
   const Model& model = like.model();
   const int nx = model.state_count(), nu = model.input_count(), np = model.parameter_count(), ny = model.output_count();
   initial_covariance_ = filter_.covariance;
-  robust_.assign(ny, 1.0);
+  weights_.assign(ny, 1.0);
   inputs_.assign(nu, 0.0);
   ends_.assign(np, 0.0);
   scratch_.assign(2 * static_cast<std::size_t>(ny), 0.0);
@@ -185,15 +185,33 @@ void ArrivalCost::slide(const RheProblem& problem, const Iterate& solution, cons
   }
 }
 
+/// Of the outputs of node 0: how much information each has, relative to its noise.
+void ArrivalCost::find_weights(const RheProblem& problem, const Iterate& solution) noexcept {
+  if (!problem.setup().robust.empty()) {
+    problem.robust_weights(solution, 0, weights_.data(), scratch_);
+  } else {
+    std::ranges::fill(weights_, 1.0);
+  }
+  const Measured measured = problem.measured(0);
+  for (std::size_t j = 0; measured.weights && j < weights_.size(); ++j) weights_[j] *= measured.weights[j];
+}
+
 void ArrivalCost::filter_first_interval(const RheProblem& problem, const Iterate& solution) noexcept {
-  if (!problem.setup().robust.empty()) problem.robust_weights(solution, 0, robust_.data(), scratch_);
-  filter_.update(problem.output(0), robust_.data());
+  find_weights(problem, solution);
+  filter_.update(problem.output(0), weights_.data());
   problem.structure().inputs_on(solution, 0, inputs_.data());
   const bool ramp = std::any_of(ramp_variances_.begin(), ramp_variances_.end(), [](double v) { return v > 0.0; });
-  if (!problem.setup().robust.empty())
+  const BetweenNodes& between = problem.between(0);
+  if (!problem.setup().robust.empty()) {
     problem.linearise_between(0, solution, between_weights_.data(), nullptr, between_scratch_);
-  filter_.predict(problem.between(0).over(problem.duration(0), problem.measured_input(0)), inputs_.data(),
-                  ramp ? ramp_variances_.data() : nullptr, between_weights_.data(), problem.output(1));
+  } else {
+    const int ny = problem.model().output_count();
+    for (int k = 0; k < between.count(); ++k)
+      for (int j = 0; j < ny; ++j)
+        between_weights_[static_cast<std::size_t>(k * ny + j)] = between.measured(k).weight(j);
+  }
+  filter_.predict(between.over(problem.duration(0), problem.measured_input(0)), inputs_.data(),
+                  ramp ? ramp_variances_.data() : nullptr, between_weights_.data(), problem.measured(1));
 }
 
 /// Rows in [dx; du; dp; dramp] about the solution: prior, outputs, measured inputs, ramp. Their QR factor R gives the
@@ -208,7 +226,7 @@ void ArrivalCost::smooth_first_interval(const RheProblem& problem, const Iterate
   problem.structure().parameters_on(solution, 0, ends_.data());
   for (int j = 0; j < np; ++j)
     if (!(ramp_variances_[j] > 0.0)) ends_[j] = p[j];
-  if (!problem.setup().robust.empty()) problem.robust_weights(solution, 0, robust_.data(), scratch_);
+  find_weights(problem, solution);
   Model::Nodes nodes;
   nodes.count = 1;
   nodes.states = x;
@@ -260,7 +278,7 @@ void ArrivalCost::smooth_first_interval(const RheProblem& problem, const Iterate
     if (std::isnan(y)) continue;
     const double difference =
         model.description().outputs[j].is_angle ? angle_difference(y, predicted_[j]) : y - predicted_[j];
-    const double weight = std::sqrt(robust_[j] / filter_.noise().output_variances[j]);
+    const double weight = std::sqrt(weights_[j] / filter_.noise().output_variances[j]);
     for (int c = 0; c < nx; ++c) rows_(row, c) = weight * output_jacobian_[c * ny + j];
     right[row] = weight * difference;
   }

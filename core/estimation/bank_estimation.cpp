@@ -75,7 +75,7 @@ bool BankEstimation::rebase(const Eigen::VectorXd& mean, const Eigen::MatrixXd& 
   return true;
 }
 
-void BankEstimation::start(const double* outputs) noexcept {
+void BankEstimation::start(Measured outputs) noexcept {
   reset();
   if (!searching_) {
     history_.start(outputs);
@@ -97,7 +97,7 @@ void BankEstimation::start_bank_if_found() noexcept {
   searching_ = false;
 }
 
-void BankEstimation::add(const MeasuredInterval& interval, const double* outputs) noexcept {
+void BankEstimation::add(const MeasuredInterval& interval, Measured outputs) noexcept {
   const bool is_new = interval.duration > 0.0 && std::isfinite(interval.duration);
   if (searching_) {
     search_->add(interval, outputs);

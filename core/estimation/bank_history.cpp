@@ -19,9 +19,9 @@ BankHistory::BankHistory(PriorBank bank, int nodes, int filtered)
       intervals_(static_cast<std::size_t>(std::max(late_nodes_, filtered))),
       between_(intervals_.size(), BetweenNodes(bank_.model().output_count(), bank_.most_between())),
       inputs_(intervals_.size() * nu_),
-      outputs_(intervals_.size() * ny_),
-      given_weights_(outputs_.size()),
-      used_weights_(outputs_.size()),
+      outputs_(intervals_.size(), MeasuredOutputs(bank_.model().output_count())),
+      given_weights_(intervals_.size() * ny_),
+      used_weights_(given_weights_.size()),
       predicted_(intervals_.size() * bank_.state_size()),
       rehearsed_(bank_.state_size()) {
   if (keeps_filtered_ || bank_.looks_ahead()) filtered_.assign(predicted_.size(), 0.0);
@@ -41,7 +41,7 @@ void BankHistory::begin_node() noexcept {
 }
 
 void BankHistory::update(std::size_t place) noexcept {
-  bank_.update(outputs_.data() + place * ny_, given_weights_.data() + place * ny_);
+  bank_.update(outputs_[place].measured(), given_weights_.data() + place * ny_);
   for (std::size_t j = 0; j < ny_; ++j) used_weights_[place * ny_ + j] = bank_.robust_weight(static_cast<int>(j));
   intervals_[place].log_likelihood = bank_.log_likelihood() + intervals_[place].between_log_likelihood;
   if (!filtered_.empty()) bank_.save(filtered_.data() + place * bank_.state_size());
@@ -51,22 +51,22 @@ void BankHistory::update(std::size_t place) noexcept {
   std::copy_n(covariance_.data(), np_ * np_, covariances_.data() + place * np_ * np_);
 }
 
-void BankHistory::start(const double* outputs, std::int64_t number) noexcept {
+void BankHistory::start(Measured outputs, std::int64_t number) noexcept {
   newest_ = number;
   count_ = 0;
   intervals_[place(number)] = {};
   between_[place(number)].clear();
-  std::copy_n(outputs, ny_, outputs_.data() + place(number) * ny_);
+  outputs_[place(number)].assign(outputs);
   begin_node();
 }
 
-void BankHistory::add(const MeasuredInterval& interval, const double* outputs) noexcept {
+void BankHistory::add(const MeasuredInterval& interval, Measured outputs) noexcept {
   RHEC_ASSERT(newest_ >= 0, "`start` comes first");
   const std::size_t at = place(++newest_);
   intervals_[at] = {.duration = interval.duration};
   between_[at].assign(interval);
   std::copy_n(interval.inputs, nu_, inputs_.data() + at * nu_);
-  std::copy_n(outputs, ny_, outputs_.data() + at * ny_);
+  outputs_[at].assign(outputs);
   predict(at);
   begin_node();
 }
@@ -74,7 +74,7 @@ void BankHistory::add(const MeasuredInterval& interval, const double* outputs) n
 /// Over the interval before a node.
 void BankHistory::predict(std::size_t place) noexcept {
   bank_.predict(between_[place].over(intervals_[place].duration, inputs_.data() + place * nu_),
-                outputs_.data() + place * ny_);
+                outputs_[place].measured());
   intervals_[place].distance = bank_.distance();
   intervals_[place].between_log_likelihood = bank_.between_log_likelihood();
 }
@@ -83,8 +83,8 @@ void BankHistory::rehearse() noexcept {
   if (count_ < 2) return;  // there is no interval yet
   const std::size_t at = place(newest_);
   bank_.save(rehearsed_.data());
-  bank_.predict(between_[at].over(intervals_[at].duration, inputs_.data() + at * nu_), outputs_.data() + at * ny_);
-  bank_.update(outputs_.data() + at * ny_, given_weights_.data() + at * ny_);
+  bank_.predict(between_[at].over(intervals_[at].duration, inputs_.data() + at * nu_), outputs_[at].measured());
+  bank_.update(outputs_[at].measured(), given_weights_.data() + at * ny_);
   bank_.restore(rehearsed_.data());
 }
 
@@ -97,12 +97,10 @@ bool BankHistory::rewind(int nodes) noexcept {
   return true;
 }
 
-bool BankHistory::amend(int back, const double* outputs) noexcept {
+bool BankHistory::amend(int back, Measured outputs) noexcept {
   if (back < 0 || back >= std::min(count_, late_nodes_)) return false;
   const std::int64_t amended = newest_ - back;
-  double* const known = outputs_.data() + place(amended) * ny_;
-  for (std::size_t j = 0; j < ny_; ++j)
-    if (!std::isnan(outputs[j])) known[j] = outputs[j];
+  outputs_[place(amended)].add(outputs);
   filter_from(amended);
   return true;
 }
@@ -134,10 +132,11 @@ bool BankHistory::reweigh(std::int64_t number, const double* robust_weights) noe
   constexpr double much = 1.25;
   if (number > newest_ || number <= newest_ - count_) return false;
   const std::size_t first = place(number) * ny_;
+  const Measured outputs = outputs_[place(number)].measured();
   bool differs = false;
   for (std::size_t j = 0; j < ny_; ++j) {
     const double ratio = robust_weights[j] / used_weights_[first + j];
-    if (std::isnan(outputs_[first + j]) || !std::isfinite(ratio)) continue;
+    if (std::isnan(outputs[static_cast<std::ptrdiff_t>(j)]) || !std::isfinite(ratio)) continue;
     differs = differs || ratio > much || ratio < 1.0 / much;
   }
   if (!differs) return false;
@@ -152,7 +151,7 @@ BankHistory::Node BankHistory::node(std::int64_t number) const noexcept {
   return {.duration = intervals_[at].duration,
           .distance = intervals_[at].distance,
           .inputs = inputs_.data() + at * nu_,
-          .outputs = outputs_.data() + at * ny_,
+          .outputs = outputs_[at].measured(),
           .between = &between_[at],
           .predicted = predicted_.data() + at * bank_.state_size(),
           .robust_weights = used_weights_.data() + at * ny_,

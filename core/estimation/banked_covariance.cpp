@@ -14,12 +14,12 @@ BankedCovariance::BankedCovariance(std::unique_ptr<WindowedEstimation> blocks, c
   covariance_ = own_ = Eigen::MatrixXd::Zero(n, n);
 }
 
-void BankedCovariance::start(const double* outputs) noexcept {
+void BankedCovariance::start(Measured outputs) noexcept {
   blocks_->start(outputs);
   bank_.start(outputs);
 }
 
-void BankedCovariance::add(const MeasuredInterval& interval, const double* outputs) noexcept {
+void BankedCovariance::add(const MeasuredInterval& interval, Measured outputs) noexcept {
   blocks_->add(interval, outputs);
   bank_.add(interval, outputs);
 }

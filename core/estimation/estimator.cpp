@@ -34,6 +34,12 @@ NodeGrid::Setup grid_setup(const EstimationMethod& method, const Estimator::Time
                             method.model().output_count()));
   for (const double delay : timeline.delays)
     if (!std::isfinite(delay)) throw Error("estimator: a delay that is not finite");
+  if (!timeline.output_sigmas.empty() && std::ssize(timeline.output_sigmas) != method.model().output_count())
+    throw Error(fmt::format("estimator: {} standard deviations of outputs given; expected {}, one an output, or none",
+                            timeline.output_sigmas.size(), method.model().output_count()));
+  for (const double sigma : timeline.output_sigmas)
+    if (!(sigma > 0.0 && std::isfinite(sigma)))
+      throw Error(fmt::format("estimator: standard deviation {} of an output; expected a positive number", sigma));
   if (timeline.capacity < 1) throw Error("estimator: capacity 0; expected room for at least 1 row");
   const Model& model = method.model();
   return {.step = timeline.longest_interval,
@@ -66,6 +72,8 @@ Estimator::Estimator(std::unique_ptr<EstimationMethod> method, const Timeline& t
   next_.assign(m.state_count(), 0.0);
   values_.assign(std::max(m.output_count(), m.input_count()), 0.0);
   delayed_.assign(m.output_count(), 0.0);
+  sigmas_ = timeline_.output_sigmas;
+  weights_.assign(m.output_count(), 1.0);
 }
 
 Estimator::Estimator(std::unique_ptr<EstimationMethod> method, const Timeline& timeline,
@@ -78,7 +86,12 @@ Estimator::Estimator(std::unique_ptr<EstimationMethod> method, const Timeline& t
       static_cast<int>(sensors) + 1,
       Clocks::Setup{.usual_interval = timeline.longest_interval,
                     .behind = std::max(least_lateness, method_->most_reach() * timeline.longest_interval)});
-  waiting_ = std::make_unique<StampedRows>(timeline.capacity, model().output_count());
+  const int outputs = model().output_count();
+  waiting_ = std::make_unique<StampedRows>(timeline.capacity, 2 * outputs);
+  merged_weights_.assign(outputs, 1.0);
+  row_.assign(2 * static_cast<std::size_t>(outputs), 1.0);
+  for (std::size_t j = sigmas_.size(); j < merged_weights_.size(); ++j)
+    sigmas_.push_back(std::sqrt(watch_->setup().noise.output_variances[j]));
   presence_.assign(sensors, SensorWatch::Presence::present);
   input_sigmas_.assign(input_.size(), 0.0);
   merged_.assign(model().output_count(), missing_value);
@@ -147,11 +160,28 @@ double Estimator::place_on_timeline(double stamp, const double* outputs) noexcep
   return time;
 }
 
-void Estimator::push_measurement(double time, const double* outputs) noexcept {
-  for (int j = 0; j < model().output_count(); ++j) {
-    values_[j] = cleaned(outputs[j]);
-    counts_.missing += std::isnan(values_[j]);
+/// Weights of the outputs in `values_` by their standard deviations (Measured); null where all are 1.
+const double* Estimator::weigh(const double* sigmas) noexcept {
+  constexpr double least_sigma = 0.01;  // relative to the usual one
+  if (!sigmas || sigmas_.empty()) return nullptr;
+  bool is_usual = true;
+  for (std::size_t j = 0; j < weights_.size(); ++j) {
+    const double ratio = sigmas[j] > 0.0 ? std::max(sigmas[j] / sigmas_[j], least_sigma) : 1.0;
+    weights_[j] = 1.0 / (ratio * ratio);
+    // What is known so badly that its weight is 0 says nothing.
+    if (!(weights_[j] > 0.0)) {
+      values_[j] = missing_value;
+      weights_[j] = 1.0;
+    }
+    is_usual = is_usual && weights_[j] == 1.0;
   }
+  return is_usual ? nullptr : weights_.data();
+}
+
+void Estimator::push_measurement(double time, const double* outputs, const double* sigmas) noexcept {
+  for (int j = 0; j < model().output_count(); ++j) values_[j] = cleaned(outputs[j]);
+  const double* const weights = weigh(sigmas);
+  for (int j = 0; j < model().output_count(); ++j) counts_.missing += std::isnan(values_[j]);
   if (watch_) time = place_on_timeline(time, values_.data());
   if (!std::isfinite(time)) {
     ++counts_.dropped;
@@ -160,7 +190,7 @@ void Estimator::push_measurement(double time, const double* outputs) noexcept {
   // Where delays differ, single outputs go to times of their own.
   const std::vector<double>& delays = timeline_.delays;
   if (delays.empty() || std::ranges::all_of(delays, [&](double each) { return each == delays.front(); }))
-    return push(time - (delays.empty() ? 0.0 : delays.front()), values_.data());
+    return push(time - (delays.empty() ? 0.0 : delays.front()), {values_.data(), weights});
   for (std::size_t first = 0; first < delays.size(); ++first) {
     if (std::find(delays.begin(), delays.begin() + first, delays[first]) != delays.begin() + first) continue;
     bool any = false;
@@ -168,23 +198,28 @@ void Estimator::push_measurement(double time, const double* outputs) noexcept {
       delayed_[j] = delays[j] == delays[first] ? values_[j] : missing_value;
       any = any || !std::isnan(delayed_[j]);
     }
-    if (any) push(time - delays[first], delayed_.data());
+    if (any) push(time - delays[first], {delayed_.data(), weights});
   }
 }
 
-void Estimator::push(double time, const double* outputs) noexcept {
+void Estimator::push(double time, Measured outputs) noexcept {
   if (!watch_) return push_judged(time, outputs);
   if (!has_started() || time > watched_ + timeline_.tolerance) {
     counts_.dropped += waiting_->is_full();
-    waiting_->insert(time, outputs);
+    for (std::size_t j = 0; j < merged_.size(); ++j) {
+      const auto output = static_cast<std::ptrdiff_t>(j);
+      row_[j] = outputs[output];
+      row_[merged_.size() + j] = outputs.weight(output);
+    }
+    waiting_->insert(time, row_.data());
     return;
   }
-  std::copy_n(outputs, merged_.size(), merged_.begin());
-  watch_->judge_late(time, merged_.data());
-  push_judged(time, merged_.data());
+  std::copy_n(outputs.values, merged_.size(), merged_.begin());
+  watch_->judge_late(time, merged_.data(), outputs.weights);
+  push_judged(time, {merged_.data(), outputs.weights});
 }
 
-void Estimator::push_judged(double time, const double* outputs) noexcept {
+void Estimator::push_judged(double time, Measured outputs) noexcept {
   const std::int64_t dropped = grid_.dropped();
   const NodeGrid::Place place = grid_.push_measurement(time, outputs, method_->reach());
   if (place == NodeGrid::Place::late) ++counts_.late;
@@ -242,15 +277,22 @@ bool Estimator::judge_waiting(double until, Clock::time_point deadline) noexcept
     if (judged > 0 && is_past(deadline)) return false;
     const double time = waiting_->time(0);
     std::fill(merged_.begin(), merged_.end(), missing_value);
+    bool is_usual = true;
     std::size_t same = 0;  // rows with this stamp, e.g. of two sensors
     for (; same < waiting_->size() && waiting_->time(same) <= time + timeline_.tolerance; ++same)
-      for (std::size_t j = 0; j < merged_.size(); ++j)
-        if (const double value = waiting_->values(same)[j]; !std::isnan(value)) merged_[j] = value;
+      for (std::size_t j = 0; j < merged_.size(); ++j) {
+        const double* const row = waiting_->values(same);
+        if (std::isnan(row[j])) continue;
+        merged_[j] = row[j];
+        merged_weights_[j] = row[merged_.size() + j];
+        is_usual = is_usual && merged_weights_[j] == 1.0;
+      }
     waiting_->drop_front(same);
-    const SensorWatch::Finding finding = judge(time, merged_.data(), deadline);
-    push_judged(time, merged_.data());
+    const double* const weights = is_usual ? nullptr : merged_weights_.data();
+    const SensorWatch::Finding finding = judge(time, merged_.data(), weights, deadline);
+    push_judged(time, {merged_.data(), weights});
     for (int i = 0; finding.release && i < watch_->held_count(); ++i)
-      push_judged(watch_->held()[i].time, watch_->held()[i].outputs.data());
+      push_judged(watch_->held()[i].time, watch_->held()[i].outputs.measured());
     bool is_complete = true;
     if (finding.rebase || !watch_->is_active()) is_complete = take_in(time, deadline);
     if (finding.rebase) {
@@ -276,7 +318,8 @@ void Estimator::rebase(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covar
 }
 
 /// Judges a row before it is used; what fails becomes NaN.
-SensorWatch::Finding Estimator::judge(double time, double* outputs, Clock::time_point deadline) noexcept {
+SensorWatch::Finding Estimator::judge(double time, double* outputs, const double* weights,
+                                      Clock::time_point deadline) noexcept {
   const double last = watched_;
   watched_ = time;
   if (!has_started()) return {};
@@ -289,7 +332,7 @@ SensorWatch::Finding Estimator::judge(double time, double* outputs, Clock::time_
       watch_->advance(end - begin, grid_.mean_input(begin, end));
     }
   });
-  const SensorWatch::Finding finding = watch_->judge(time, outputs);
+  const SensorWatch::Finding finding = watch_->judge(time, outputs, weights);
   counts_.rejected = 0;
   for (const SensorHealth& sensor : watch_->sensor_states()) counts_.rejected += sensor.rejected;
   return finding;

@@ -49,7 +49,7 @@ Excitation::Excitation(std::shared_ptr<const Model> model, std::vector<int> outp
   hessians_.assign(outputs_.size() * nz * nz, 0.0);
 }
 
-bool Excitation::find(const MeasuredInterval& interval, const double* weights, const double* end_outputs,
+bool Excitation::find(const MeasuredInterval& interval, const double* weights, Measured end_outputs,
                       const Knowledge& knowledge, double* history) noexcept {
   if (outputs_.empty()) return false;
   begin(knowledge);
@@ -58,12 +58,11 @@ bool Excitation::find(const MeasuredInterval& interval, const double* weights, c
   integrate(interval.between + 1, times_.data(), false);
   for (int k = 0; k <= interval.between; ++k) {
     const std::ptrdiff_t row = static_cast<std::ptrdiff_t>(k) * ny_;
-    const double* const y = k == interval.between ? end_outputs : interval.outputs + row;
+    const Measured y = k == interval.between ? end_outputs : Measured{interval.outputs + row, weights + row};
     for (std::size_t j = 0; y && j < outputs_.size(); ++j) {
       const int output = outputs_[j];
       if (std::isnan(y[output])) continue;
-      take(k, output, y[output],
-           knowledge.output_variances[output] / (k == interval.between ? 1.0 : weights[row + output]));
+      take(k, output, y[output], knowledge.output_variances[output] / y.weight(output));
     }
   }
   if (!mean_.allFinite() || !covariance_.allFinite()) return false;
@@ -165,7 +164,7 @@ void Excitation::take(int row, int output, double measured, double variance) noe
   }
 }
 
-bool Excitation::is_measured(const MeasuredInterval& interval, const double* end_outputs, int output) const noexcept {
+bool Excitation::is_measured(const MeasuredInterval& interval, Measured end_outputs, int output) const noexcept {
   if (end_outputs && !std::isnan(end_outputs[output])) return true;
   for (int k = 0; k < interval.between; ++k)
     if (!std::isnan(interval.outputs[static_cast<std::ptrdiff_t>(k) * ny_ + output])) return true;

@@ -38,8 +38,8 @@ class Excitation {
   };
   /// Takes in an interval whose measurements stand for `weights` (rows of n_y) others, and those of its end (n_y, or
   /// null). Whether it is to be linearised at `target`.
-  bool find(const MeasuredInterval& interval, const double* weights, const double* end_outputs,
-            const Knowledge& knowledge, double* history) noexcept;
+  bool find(const MeasuredInterval& interval, const double* weights, Measured end_outputs, const Knowledge& knowledge,
+            double* history) noexcept;
   /// [x; u]: given the measurements with the parameters at their means, moved by no more than four standard deviations
   /// to where they tell of slip what may be believed.
   const Eigen::VectorXd& target() const noexcept { return target_; }
@@ -48,7 +48,7 @@ class Excitation {
   void begin(const Knowledge& knowledge) noexcept;
   void integrate(int count, const double* seconds, bool is_curved) noexcept;
   void take(int row, int output, double measured, double variance) noexcept;
-  bool is_measured(const MeasuredInterval& interval, const double* end_outputs, int output) const noexcept;
+  bool is_measured(const MeasuredInterval& interval, Measured end_outputs, int output) const noexcept;
   bool move(int row, double* history) noexcept;
 
   std::shared_ptr<const Model> model_;

@@ -74,7 +74,7 @@ bool FilterEstimation::rebase(const Eigen::VectorXd& mean, const Eigen::MatrixXd
 }
 
 /// Log-likelihood of the measured outputs given the past, each on its own.
-double FilterEstimation::log_likelihood(const KalmanFilter& filter, const double* outputs) noexcept {
+double FilterEstimation::log_likelihood(const KalmanFilter& filter, Measured outputs) noexcept {
   const Model& m = filter.model();
   const int ny = m.output_count(), nx = m.state_count();
   Model::Nodes request;
@@ -88,7 +88,7 @@ double FilterEstimation::log_likelihood(const KalmanFilter& filter, const double
     if (std::isnan(outputs[j])) continue;
     const double error =
         m.description().outputs[j].is_angle ? angle_difference(outputs[j], predicted_[j]) : outputs[j] - predicted_[j];
-    double variance = filter.noise().output_variances[j];
+    double variance = filter.noise().output_variances[j] / outputs.weight(j);
     for (int c = 0; c < nx; ++c)
       for (int r = 0; r < nx; ++r) variance += jacobian_[c * ny + j] * filter.covariance(r, c) * jacobian_[r * ny + j];
     // A single outlier must not decide.
@@ -97,10 +97,10 @@ double FilterEstimation::log_likelihood(const KalmanFilter& filter, const double
   return sum;
 }
 
-void FilterEstimation::take(const double* outputs) noexcept {
+void FilterEstimation::take(Measured outputs) noexcept {
   for (std::size_t i = 0; i < alive_; ++i) {
     if (alive_ > 1) bank_[i].log_likelihood += log_likelihood(bank_[i].filter, outputs);
-    bank_[i].filter.update(outputs, nullptr);
+    bank_[i].filter.update(outputs);
   }
   if (alive_ == 1) return;
   best_ = 0;
@@ -116,14 +116,14 @@ void FilterEstimation::take(const double* outputs) noexcept {
   alive_ = 1;
 }
 
-void FilterEstimation::start(const double* outputs) noexcept {
+void FilterEstimation::start(Measured outputs) noexcept {
   reset();
   take(outputs);
   newest_ = 0;
   remember();
 }
 
-void FilterEstimation::add(const MeasuredInterval& interval, const double* outputs) noexcept {
+void FilterEstimation::add(const MeasuredInterval& interval, Measured outputs) noexcept {
   if (!(interval.duration > 0.0) || !std::isfinite(interval.duration)) {
     take(outputs);
     --remembered_;  // the same node

@@ -49,7 +49,7 @@ void HeadingSearch::predict(const double* inputs, double duration) noexcept {
   for (Heading& heading : headings_) heading.filter.predict(inputs, duration);
 }
 
-bool HeadingSearch::update(const std::vector<Sensor>& sensors, const double* outputs) noexcept {
+bool HeadingSearch::update(const std::vector<Sensor>& sensors, Measured outputs) noexcept {
   for (Heading& heading : headings_) {
     heading.filter.expect();
     ++heading.explained;

@@ -22,7 +22,7 @@ class HeadingSearch {
   void start(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance) noexcept;
   void predict(const double* inputs, double duration) noexcept;
   /// Uses outputs (n_y, NaN where missing). True once the heading is found; then it is active no more.
-  bool update(const std::vector<Sensor>& sensors, const double* outputs) noexcept;
+  bool update(const std::vector<Sensor>& sensors, Measured outputs) noexcept;
   /// The filter that explains the measurements best.
   const WalkingFilter& best() const noexcept { return headings_[best_].filter; }
   /// Samples in a row that it has explained.

@@ -89,29 +89,29 @@ void KalmanFilter::clip() noexcept {
     mean[nx_ + j] = std::min(std::max(mean[nx_ + j], noise_.parameter_lower[j]), noise_.parameter_upper[j]);
 }
 
-void KalmanFilter::update(const double* y, const double* robust_weights) noexcept {
+void KalmanFilter::update(Measured y, const double* information_weights) noexcept {
+  if (information_weights) y.weights = information_weights;
   model_->observe(
       {.count = 1, .states = mean.data(), .outputs = predicted_.data(), .jacobians = output_jacobian_.data()});
   std::ranges::fill(added_, 0.0);
   if (std::ranges::any_of(curved_outputs_, [y](int j) { return !std::isnan(y[j]); })) {
     // Once to see where the outputs put the state, then linearised there.
     before_ = covariance;
-    take_outputs(y, robust_weights);
+    take_outputs(y);
     point_.head(nx_) = mean.head(nx_) + correction_.head(nx_);
     linearise_outputs();
     covariance = before_;
   }
-  take_outputs(y, robust_weights);
+  take_outputs(y);
   mean += correction_;
   clip();
 }
 
 /// One output after the other, all linearised at the same point; the noises are independent.
-void KalmanFilter::take_outputs(const double* y, const double* robust_weights) noexcept {
+void KalmanFilter::take_outputs(Measured y) noexcept {
   correction_.setZero();
   for (int j = 0; j < ny_; ++j)
-    if (!std::isnan(y[j]))
-      take_output(j, y[j], noise_.output_variances[j] / (robust_weights ? robust_weights[j] : 1.0) + added_[j]);
+    if (!std::isnan(y[j])) take_output(j, y[j], noise_.output_variances[j] / y.weight(j) + added_[j]);
 }
 
 /// Outputs as expected at the mean, linearised about `point_`. Those that are curved have means and variances of their

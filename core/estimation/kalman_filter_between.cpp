@@ -14,11 +14,11 @@ namespace rhec {
 /// What is unknown within an interval are [x; p] at its start, the input, and the change of p. Measurements at later
 /// times tell of all of these; only then they move to the interval's end.
 void KalmanFilter::predict(const MeasuredInterval& interval, const double* input_guess, const double* ramp_variances,
-                           const double* robust_weights, const double* end_outputs) noexcept {
+                           const double* information_weights, Measured end_outputs) noexcept {
   between_log_likelihood_ = 0.0;
   is_curved_ = false;
   if (measures_motion(noise_.motion_outputs, interval, static_cast<std::size_t>(ny_), end_outputs)) {
-    look_ahead(interval, input_guess, ramp_variances, robust_weights, end_outputs);
+    look_ahead(interval, input_guess, ramp_variances, information_weights, end_outputs);
   } else {
     if (interval.between == 0) return predict(interval.inputs, input_guess, interval.duration, ramp_variances);
     RHEC_ASSERT(wide_mean_.size() > 0, "a filter that was set up for measurements between nodes");
@@ -30,7 +30,7 @@ void KalmanFilter::predict(const MeasuredInterval& interval, const double* input
     };
     for (int k = 0; k < interval.between; ++k) {
       linearise(interval.times[k]);
-      take_between(interval, k, robust_weights);
+      take_between(interval, k, information_weights ? information_weights : interval.weights);
     }
     linearise(interval.duration);
   }
@@ -39,13 +39,13 @@ void KalmanFilter::predict(const MeasuredInterval& interval, const double* input
 
 /// Gauss-Newton steps, until the point does not move by much.
 MeasuredInterval KalmanFilter::look_ahead(const MeasuredInterval& measured, const double* input_guess,
-                                          const double* ramp_variances, const double* robust_weights,
-                                          const double* end_outputs) noexcept {
+                                          const double* ramp_variances, const double* information_weights,
+                                          Measured end_outputs) noexcept {
   RHEC_ASSERT(wide_mean_.size() > 0, "a filter that was set up for outputs of motion");
   is_curved_ = !curved_.empty();
   widen(measured.inputs, input_guess, ramp_variances);
-  const MeasuredInterval interval = robust_weights ? measured : summary_(measured);
-  const double* const weights = robust_weights ? robust_weights : summary_.weights();
+  const MeasuredInterval interval = information_weights ? measured : summary_(measured);
+  const double* const weights = information_weights ? information_weights : summary_.weights();
   std::copy_n(interval.times, interval.between, times_.begin());
   times_[interval.between] = interval.duration;
   const Eigen::Index plain = Eigen::Index{nx_} + np_ + nu_ + np_;
@@ -248,7 +248,7 @@ double KalmanFilter::expect_wide(int output, double measured) noexcept {
 }
 
 /// To the mean given the outputs of motion at the end, linearised about the point.
-void KalmanFilter::find_next_point(const double* y) noexcept {
+void KalmanFilter::find_next_point(Measured y) noexcept {
   constexpr double most_surprise = 16.0;
   next_point_ = wide_mean_;
   Eigen::Index count = 0;
@@ -265,7 +265,7 @@ void KalmanFilter::find_next_point(const double* y) noexcept {
       motion_covariance_(count, k) = motion_gradients_.col(k).dot(motion_images_.col(count));
     double& total = motion_covariance_(count, count);
     // An outlier decides nothing.
-    total = std::max(total + noise_.output_variances[j],
+    total = std::max(total + noise_.output_variances[j] / y.weight(j),
                      motion_innovations_[count] * motion_innovations_[count] / most_surprise);
     ++count;
   }

@@ -169,10 +169,10 @@ Passage pass(const std::shared_ptr<const Model>& model, BankEstimation::Setup se
   setup.bank.most_between = log.most_between();
   BankEstimation filters(model, std::move(setup));
   Passage passage;
-  filters.start(log.outputs.data());
+  filters.start(log.measured(0, ny));
   for (std::ptrdiff_t i = 0; i < N; ++i) {
     const bool is_searched = filters.is_searching();
-    filters.add(log.interval(static_cast<int>(i), nu), log.outputs.data() + (i + 1) * ny);
+    filters.add(log.interval(static_cast<int>(i), nu), log.measured(static_cast<int>(i) + 1, ny));
     passage.distances.push_back(is_searched ? std::numeric_limits<double>::quiet_NaN() : filters.bank().distance());
   }
   const auto found = filters.bank().log_likelihoods();

@@ -18,11 +18,12 @@ constexpr double near_share = 0.05;  // of a step: so far nodes are moved to mea
 NodeGrid::NodeGrid(const Setup& setup)
     : setup_(setup),
       near_(std::max(near_share * setup.step, setup.tolerance)),
-      measurements_(setup.capacity, setup.outputs),
+      measurements_(setup.capacity, 2 * setup.outputs),
       inputs_(setup.capacity, setup.inputs),
       nodes_(static_cast<std::size_t>(setup.reach) + 2),
       between_(setup.outputs, setup.most_between),
-      outputs_(setup.outputs, missing),
+      outputs_(setup.outputs),
+      row_(2 * static_cast<std::size_t>(setup.outputs), 1.0),
       mean_(setup.inputs, 0.0),
       weight_(setup.inputs, 0.0) {
   clear();
@@ -54,7 +55,7 @@ std::int64_t NodeGrid::last_before(double time) const noexcept {
   return number;
 }
 
-NodeGrid::Place NodeGrid::push_measurement(double time, const double* outputs, int reach) noexcept {
+NodeGrid::Place NodeGrid::push_measurement(double time, Measured outputs, int reach) noexcept {
   const bool is_late = count_ > 0 && time <= this->time() + setup_.tolerance;
   if (is_late) {
     const std::int64_t kept = last_before(time);
@@ -65,7 +66,11 @@ NodeGrid::Place NodeGrid::push_measurement(double time, const double* outputs, i
   }
   const bool was_full = measurements_.is_full();
   const double oldest_row = was_full ? measurements_.time(0) : 0.0;
-  const bool is_taken = measurements_.insert(time, outputs) < measurements_.size();
+  for (int j = 0; j < setup_.outputs; ++j) {
+    row_[j] = outputs[j];
+    row_[setup_.outputs + j] = outputs.weight(j);
+  }
+  const bool is_taken = measurements_.insert(time, row_.data()) < measurements_.size();
   if (was_full) {
     // What a node has used is not lost, but cannot be used anew.
     const bool is_used = count_ > 0 && oldest_row <= this->time() + setup_.tolerance;
@@ -117,13 +122,6 @@ std::size_t NodeGrid::group_end(std::size_t row) const noexcept {
   return end;
 }
 
-/// Outputs of rows with one stamp; of an output that several have, the last.
-void NodeGrid::merge(std::size_t row, std::size_t end, double* outputs) const noexcept {
-  for (; row < end; ++row)
-    for (int j = 0; j < setup_.outputs; ++j)
-      if (const double value = measurements_.values(row)[j]; !std::isnan(value)) outputs[j] = value;
-}
-
 void NodeGrid::make_next(double until) noexcept {
   const std::size_t from = next_row(), end = measurements_.first_after(until + setup_.tolerance);
   Node next{measurements_.time(from), measurements_.time(from), Kind::grid, 0};
@@ -168,17 +166,18 @@ NodeGrid::Node NodeGrid::next_node(const Node& last, std::size_t from, std::size
   return next;
 }
 
-/// What was measured up to a node, and at it.
+/// What was measured up to a node, and at it; of an output that several rows of one stamp have, the last.
 void NodeGrid::collect(const Node& next, std::size_t from, std::size_t end) noexcept {
   const double start = next.time - duration_;
   between_.clear();
-  std::fill(outputs_.begin(), outputs_.end(), missing);
+  outputs_.clear();
   for (std::size_t row = from; row < end && measurements_.time(row) <= next.time + setup_.tolerance;) {
     const std::size_t behind = std::min(group_end(row), end);
     if (measurements_.time(row) < next.time - setup_.tolerance) {
-      if (double* const outputs = between_.add(measurements_.time(row) - start)) merge(row, behind, outputs);
+      if (between_.add(measurements_.time(row) - start))
+        for (; row < behind; ++row) between_.add_outputs(between_.count() - 1, measured(row));
     } else {
-      merge(row, behind, outputs_.data());
+      for (; row < behind; ++row) outputs_.add(measured(row));
     }
     row = behind;
   }

@@ -31,7 +31,7 @@ void fill_data(const NodeLog& log, int inputs, RheProblem& problem) {
   const int nu = problem.model().input_count(), ny = problem.model().output_count(), N = log.intervals();
   for (std::ptrdiff_t i = 0; i <= N; ++i) {
     const int node = static_cast<int>(i);
-    std::copy_n(log.outputs.data() + i * ny, ny, problem.output(node));
+    problem.set_output(node, log.measured(node, ny));
     if (i == N) break;
     std::copy_n(log.inputs.data() + i * inputs, inputs, problem.measured_input(node));
     std::fill(problem.measured_input(node) + inputs, problem.measured_input(node) + nu, 0.0);

@@ -136,7 +136,7 @@ void OffsetWatch::widen(const WalkingFilter& filter, const Sensor& sensor, const
 }
 
 /// One output after the other, as the filter does it: innovations of a sample are then independent.
-void OffsetWatch::take(const WalkingFilter& filter, const double* outputs, double excess) noexcept {
+void OffsetWatch::take(const WalkingFilter& filter, Measured outputs, double excess) noexcept {
   if (outputs_.empty()) return;
   const int nx = filter.model().state_count(), ny = filter.model().output_count();
   covariance_ = filter.covariance();
@@ -150,7 +150,7 @@ void OffsetWatch::take(const WalkingFilter& filter, const double* outputs, doubl
       gradient_[c] = filter.derivative(j, c);
       if (gradient_[c] != 0.0) image_ += covariance_.col(c) * gradient_[c];
     }
-    variance_ = variances_[j] + gradient_.dot(image_);
+    variance_ = variances_[j] / outputs.weight(j) + gradient_.dot(image_);
     const double error =
         is_angle_[j] ? angle_difference(outputs[j], filter.expected(j)) : outputs[j] - filter.expected(j);
     innovation_ = error - gradient_.dot(correction_);

@@ -38,7 +38,7 @@ class OffsetWatch {
   void widen(const WalkingFilter& filter, const Sensor& sensor, const double* outputs, Innovation& innovation) noexcept;
   /// What the filter is about to use of the outputs, after `expect`. `excess`: squares of innovations have been so many
   /// times what was expected.
-  void take(const WalkingFilter& filter, const double* outputs, double excess) noexcept;
+  void take(const WalkingFilter& filter, Measured outputs, double excess) noexcept;
   /// Whether innovations say that an output is off, or has come back.
   bool has_suspect() const noexcept { return suspect_ >= 0 || refuted_ >= 0; }
   /// Adopts that offset; the filter, after its update, becomes what it would be without it.

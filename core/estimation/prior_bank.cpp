@@ -143,6 +143,7 @@ PriorBank::PriorBank(std::shared_ptr<const Model> model, Setup setup)
   for (auto* v : {&weights_, &log_likelihoods_, &keep_, &take_, &squares_}) v->assign(M, 0.0);
   innovation_variances_.assign(ny_ * M, 0.0);
   output_variances_.assign(ny_ * M, 0.0);
+  stated_weights_.assign(ny_, 1.0);
   learnt_.assign(2 * static_cast<std::size_t>(ny_), 0.0);
   const std::vector<Variable>& outputs = model_->description().outputs;
   for (int j = 0; j < ny_; ++j) {
@@ -308,7 +309,7 @@ void PriorBank::observe_members(const double* states) noexcept {
     for (int j = 0; j < ny_; ++j) predicted_[j * lanes_ + m] = output_rows_[m * ny_ + j];
 }
 
-void PriorBank::update(const double* y, const double* robust_weights) noexcept {
+void PriorBank::update(Measured y, const double* robust_weights) noexcept {
   for (int m = 0; m < lanes_; ++m)
     for (int r = 0; r < nx_; ++r) states_[m * nx_ + r] = mean_[r * lanes_ + m];
   linearise_nodes();
@@ -318,17 +319,21 @@ void PriorBank::update(const double* y, const double* robust_weights) noexcept {
               .before = states_.data(),
               .before_entry = 1,
               .before_lane = nx_,
-              .is_between = false};
+              .is_between = false,
+              .weights = y.weights};
   std::ranges::fill(added_, 0.0);
-  if (ahead_) spread_variances();
+  is_weighed_ = y.weights != nullptr;
+  if (is_weighed_) std::copy_n(y.weights, ny_, stated_weights_.begin());
+  if (ahead_ || is_weighed_) spread_variances(y.weights);
   if (ahead_ && std::ranges::any_of(ahead_->curved_outputs, [y](int j) { return !std::isnan(y[j]); })) {
-    linearise_given(y);
+    linearise_given(y.values);
     wide_before_ = wide_mean_;
     frame.before = wide_before_.data();
     frame.before_entry = lanes_;
     frame.before_lane = 1;
   }
-  log_likelihood_ = take_outputs(frame, y, robust_weights);
+  log_likelihood_ = take_outputs(frame, y.values, robust_weights);
+  if (is_weighed_ && setup_.robust.empty()) spread_variances();
 }
 
 /// Outputs and gradients at `states_`.

@@ -23,7 +23,7 @@ constexpr int most_steps_of_slip = 2;
 /// Within an interval, what is unknown are the state at its start, the input's noise and that of the processes: a
 /// measurement at a later time tells of all of them. The vector [x; z; u; q] takes such measurements in one after the
 /// other, and only then moves to the interval's end.
-void PriorBank::predict(const MeasuredInterval& measured, const double* end_outputs) noexcept {
+void PriorBank::predict(const MeasuredInterval& measured, Measured end_outputs) noexcept {
   is_curved_ = false;
   std::ranges::fill(added_, 0.0);
   const bool has_motion = measures_motion(setup_.motion_outputs, measured, static_cast<std::size_t>(ny_), end_outputs);
@@ -53,7 +53,7 @@ int PriorBank::wide_count() const noexcept {
 
 /// Linearises the interval where its measurements put every member. All start where they put a filter on the mixture,
 /// and have that filter's second-order terms.
-MeasuredInterval PriorBank::look_ahead(const MeasuredInterval& measured, const double* end_outputs) noexcept {
+MeasuredInterval PriorBank::look_ahead(const MeasuredInterval& measured, Measured end_outputs) noexcept {
   const std::ptrdiff_t M = lanes_;
   for (int j = 0; j < ny_; ++j) ahead_->mixture.set_output_variance(j, learnt_[j]);
   for (int j = 0; j < np_; ++j) {
@@ -234,7 +234,7 @@ void PriorBank::linearise_outputs(int which, const double* y, double share, doub
 }
 
 /// All measurements between the nodes, outputs y at the end (null: none), and the end itself, about `point_`.
-void PriorBank::linearise_about_point(const MeasuredInterval& interval, const double* end_outputs) noexcept {
+void PriorBank::linearise_about_point(const MeasuredInterval& interval, Measured end_outputs) noexcept {
   for (int k = 0; k < interval.between; ++k) {
     const double seconds = interval.times[k], first = interval.times[0],
                  from_first = (seconds - first) / (interval.duration - first);
@@ -246,7 +246,7 @@ void PriorBank::linearise_about_point(const MeasuredInterval& interval, const do
   }
   integrate_members(point_.data(), true, interval.duration, 1.0);
   add_curvature(1.0);
-  if (end_outputs) linearise_outputs(interval.between, end_outputs, 1.0, 1.0);
+  if (end_outputs) linearise_outputs(interval.between, end_outputs.values, 1.0, 1.0);
 }
 
 /// The outputs of measurement number `which` as expected at a mean of the wide vector, linearised about `point_`.
@@ -265,7 +265,7 @@ void PriorBank::expect_outputs(int which, const double* y, const double* mean) n
 
 /// The next points of the members: the means given the measurements between the nodes and the outputs of motion at the
 /// end, linearised about the points. False if no point moves by much.
-bool PriorBank::move_point(const MeasuredInterval& interval, const double* end_outputs) noexcept {
+bool PriorBank::move_point(const MeasuredInterval& interval, Measured end_outputs) noexcept {
   constexpr double little = least_look_ahead_step * least_look_ahead_step;
   const int a = wide_count();
   const std::ptrdiff_t M = lanes_, entries = a * M;
@@ -284,7 +284,7 @@ bool PriorBank::move_point(const MeasuredInterval& interval, const double* end_o
     bank_kernels().update(view, views_->outputs.data(), taken, setup_.gate, squares_.data(),
                           innovation_variances_.data());
   }
-  spread_variances();
+  spread_variances(end_outputs.weights);
   views_->taken = 0;
   for (const std::ptrdiff_t j : setup_.motion_outputs) {
     if (!end_outputs || std::isnan(end_outputs[j])) continue;
@@ -359,11 +359,13 @@ void PriorBank::LookAhead::bound_surprises(const BankView& view, const Views& vi
 /// tell of that together: of a law they say the same again and again. So the last of them weighs the members.
 void PriorBank::take_between(const MeasuredInterval& interval, int which, bool about_point) noexcept {
   const std::ptrdiff_t a = wide_count(), M = lanes_;
-  const double* const y = interval.outputs + static_cast<std::ptrdiff_t>(which) * ny_;
+  const auto [y, stated] = interval.measured(which, ny_);
+  const double* const weights = about_point ? reading_weights(which) : stated;
   if (!about_point) {
     const double seconds = interval.times[which], share = seconds / interval.duration;
     integrate_members(wide_mean_.data(), true, seconds, share);
     linearise_outputs(which, y, share, 1.0);
+    if (interval.weights) spread_variances(weights);
   }
   const auto take = [&](const double* taken, bool tells_laws) {
     if (about_point) {
@@ -378,11 +380,15 @@ void PriorBank::take_between(const MeasuredInterval& interval, int which, bool a
                       .before = wide_before_.data(),
                       .before_entry = lanes_,
                       .before_lane = 1,
-                      .weights = about_point ? reading_weights(which) : nullptr,
+                      .weights = weights,
                       .tells_laws = tells_laws},
                      taken, nullptr);
   };
-  if (!about_point || members_ == 1) return take(y, true);
+  if (!about_point || members_ == 1) {
+    take(y, true);
+    if (!about_point && weights && setup_.robust.empty()) spread_variances();
+    return;
+  }
   const auto is_repeated = [&](int j) {
     return is_of_motion(j) && LookAhead::is_measured_later(interval, which, ny_, j, ahead_->end_outputs);
   };

@@ -23,10 +23,11 @@ void PriorBank::reset_noise() noexcept {
   spread_variances();
 }
 
-/// To all lanes.
-void PriorBank::spread_variances() noexcept {
+/// To all lanes, of outputs with weights (null: 1).
+void PriorBank::spread_variances(const double* weights) noexcept {
   for (int j = 0; j < ny_; ++j)
-    std::fill_n(output_variances_.data() + static_cast<std::ptrdiff_t>(j) * lanes_, lanes_, learnt_[j]);
+    std::fill_n(output_variances_.data() + static_cast<std::ptrdiff_t>(j) * lanes_, lanes_,
+                weights ? learnt_[j] / weights[j] : learnt_[j]);
 }
 
 PriorBank::Noise PriorBank::noise(int output) const noexcept {
@@ -101,7 +102,7 @@ void PriorBank::adapt_noise(const Frame& frame, const double* y) noexcept {
 void PriorBank::weigh_outputs(const Frame& frame, const double* y, int taken, const double* given) noexcept {
   for (int j = 0; j < ny_; ++j)
     std::fill_n(output_variances_.data() + static_cast<std::ptrdiff_t>(j) * lanes_, lanes_,
-                (learnt_[j] + added_[j]) / (frame.weights ? frame.weights[j] : 1.0));
+                learnt_[j] / (frame.weights ? frame.weights[j] : 1.0) + added_[j]);
   bank_kernels().surprise(frame.view, views_->outputs.data(), taken, surprises_.data());
   const auto place = [&](int output) {
     return std::count_if(y, y + output, [](double each) { return !std::isnan(each); });
@@ -124,7 +125,9 @@ int PriorBank::most_probable() const noexcept {
 }
 
 double PriorBank::robust_weight(int output) const noexcept {
-  return (learnt_[output] + added_[output]) /
+  // Noise that adapts has been spread anew since.
+  const double stated = is_weighed_ && !setup_.robust.empty() && !setup_.adapts_noise ? stated_weights_[output] : 1.0;
+  return (learnt_[output] / stated + added_[output]) /
          output_variances_[static_cast<std::ptrdiff_t>(output) * lanes_ + most_probable()];
 }
 

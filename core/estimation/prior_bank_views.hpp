@@ -39,16 +39,16 @@ struct PriorBank::LookAhead {
   Curvature output_curvature = {};  ///< of these, by the state
   AlignedDoubles next_point = {}, moved = {}, trial_mean = {}, trial_covariance = {};  ///< of the wide vector
   std::vector<double> ramp_variances = {}, no_input = {};
-  std::vector<double> shares = {};      ///< of the interval, at its measurements
-  std::vector<double> part = {};        ///< n_y: some of the outputs of a time
-  AlignedDoubles surprises = {};        ///< n_y, lanes
-  const double* end_outputs = nullptr;  ///< of the interval
+  std::vector<double> shares = {};  ///< of the interval, at its measurements
+  std::vector<double> part = {};    ///< n_y: some of the outputs of a time
+  AlignedDoubles surprises = {};    ///< n_y, lanes
+  Measured end_outputs = {};        ///< of the interval
   /// Raises the variances of outputs of motion (n_y, lanes) whose innovations are far larger than expected.
   void bound_surprises(const BankView& view, const Views& views, const double* y,
                        const std::vector<int>& motion_outputs, double* variances) noexcept;
   /// Whether an output is measured again on the interval after measurement number `which`, or at its end.
   static bool is_measured_later(const MeasuredInterval& interval, int which, std::ptrdiff_t output_count, int output,
-                                const double* end_outputs) noexcept {
+                                Measured end_outputs) noexcept {
     for (int k = which + 1; k < interval.between; ++k)
       if (!std::isnan(interval.outputs[k * output_count + output])) return true;
     return end_outputs && !std::isnan(end_outputs[output]);
@@ -74,7 +74,7 @@ struct PriorBank::Frame {
   const double* before;
   std::ptrdiff_t before_entry, before_lane;
   bool is_between = true;           ///< the outputs are of a time between two nodes
-  const double* weights = nullptr;  ///< n_y: how many measurements each stands for; null: one
+  const double* weights = nullptr;  ///< n_y: how many measurements of usual accuracy each stands for; null: one
   bool tells_laws = true;           ///< whether the outputs weigh the members
 };
 

@@ -77,13 +77,13 @@ bool PriorHorizonEstimation::rebase(const Eigen::VectorXd& mean, const Eigen::Ma
   return filters_.rebase(mean, covariance);
 }
 
-void PriorHorizonEstimation::start(const double* outputs) noexcept {
+void PriorHorizonEstimation::start(Measured outputs) noexcept {
   reset();
   filters_.start(outputs);
   choose_law();
 }
 
-void PriorHorizonEstimation::add(const MeasuredInterval& interval, const double* outputs) noexcept {
+void PriorHorizonEstimation::add(const MeasuredInterval& interval, Measured outputs) noexcept {
   filters_.add(interval, outputs);
   choose_law();
 }
@@ -127,7 +127,7 @@ void PriorHorizonEstimation::fill_interval(int interval, std::int64_t number) no
   double* const inputs = problem_.measured_input(interval);
   std::copy_n(node.inputs, nu, inputs);
   std::fill(inputs + nu, inputs + process_model_->input_count(), 0.0);
-  std::copy_n(node.outputs, model().output_count(), problem_.output(interval + 1));
+  problem_.set_output(interval + 1, node.outputs);
   problem_.between(interval).assign(*node.between);
   const auto place = static_cast<std::size_t>(number % static_cast<std::int64_t>(advances_.size()));
   double* const data = known_data_.data() + place * process_model_->data_count();
@@ -157,7 +157,7 @@ void PriorHorizonEstimation::fill_window() noexcept {
   has_window_ = true;
   problem_.set_intervals(N);
   const BankHistory::Node first = history.node(next.first);
-  std::copy_n(first.outputs, model().output_count(), problem_.output(0));
+  problem_.set_output(0, first.outputs);
   for (int i = 0; i < N; ++i) fill_interval(i, next.first + i + 1);
   for (int j = 0; j < model().output_count(); ++j) problem_.set_output_weight(j, 1.0 / bank().noise(j).variance);
   write_arrival(first.predicted);

@@ -24,6 +24,7 @@ ReadingSummary::ReadingSummary(std::vector<int> outputs, int output_count, int m
 MeasuredInterval ReadingSummary::operator()(const MeasuredInterval& interval) noexcept {
   count_ = 0;
   const auto value = [&](int k, int j) { return interval.outputs[static_cast<std::ptrdiff_t>(k) * width_ + j]; };
+  const auto weight = [&](int k, int j) { return interval.measured(k, width_).weight(j); };
   for (int j = 0; j < width_; ++j) {
     const bool is_chosen = std::ranges::binary_search(outputs_, j);
     int first = 0;
@@ -34,11 +35,12 @@ MeasuredInterval ReadingSummary::operator()(const MeasuredInterval& interval) no
       for (; last < interval.between && interval.times[last] < end; ++last)
         if (!std::isnan(value(last, j))) present_[taken++] = last;
       if (!is_chosen || taken < least || !summarise(interval, j, taken))
-        for (int i = 0; i < taken; ++i) add(interval.times[present_[i]], j, value(present_[i], j), 1.0);
+        for (int i = 0; i < taken; ++i)
+          add(interval.times[present_[i]], j, value(present_[i], j), weight(present_[i], j));
       first = last;
     }
   }
-  return {interval.duration, interval.inputs, count_, times_.data(), values_.data()};
+  return {interval.duration, interval.inputs, count_, times_.data(), values_.data(), weights_.data()};
 }
 
 /// The polynomials that are orthonormal over the times, by Stieltjes' procedure: their recurrence is the Jacobi matrix,
@@ -52,12 +54,18 @@ bool ReadingSummary::summarise(const MeasuredInterval& interval, int output, int
   const auto q = [&](int degree) { return polynomials_.data() + static_cast<std::ptrdiff_t>(degree) * taken; };
   Eigen::Matrix<double, nodes, 1> diagonal, coefficients;
   Eigen::Matrix<double, nodes - 1, 1> beside;
-  std::fill_n(q(0), taken, 1.0 / std::sqrt(static_cast<double>(taken)));
+  // Orthonormal are the polynomials times the roots of the measurements' weights: those stand in `q`.
+  const auto weight_of = [&](int i) { return interval.measured(present_[i], width_).weight(output); };
+  const auto root_of = [&](int i) { return interval.weights ? std::sqrt(weight_of(i)) : 1.0; };
+  double total = 0.0;
+  for (int i = 0; i < taken; ++i) total += weight_of(i);
+  for (int i = 0; i < taken; ++i) q(0)[i] = root_of(i) / std::sqrt(total);
   for (int d = 0; d < nodes; ++d) {
     diagonal[d] = coefficients[d] = 0.0;
     for (int i = 0; i < taken; ++i) {
       diagonal[d] += (time(i) - middle) / half * q(d)[i] * q(d)[i];
-      coefficients[d] += q(d)[i] * interval.outputs[static_cast<std::ptrdiff_t>(present_[i]) * width_ + output];
+      coefficients[d] +=
+          root_of(i) * q(d)[i] * interval.outputs[static_cast<std::ptrdiff_t>(present_[i]) * width_ + output];
     }
     if (d + 1 == nodes) break;
     double squares = 0.0;
@@ -76,8 +84,7 @@ bool ReadingSummary::summarise(const MeasuredInterval& interval, int output, int
     double value = 0.0;
     for (int d = 0; d < nodes; ++d) value += coefficients[d] * vectors(d, n);
     const double first = vectors(0, n);
-    add(middle + half * solver.eigenvalues()[n], output, value / (first * std::sqrt(static_cast<double>(taken))),
-        taken * first * first);
+    add(middle + half * solver.eigenvalues()[n], output, value / (first * std::sqrt(total)), total * first * first);
   }
   return true;
 }

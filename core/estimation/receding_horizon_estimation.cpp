@@ -81,8 +81,9 @@ RecedingHorizonEstimation::RecedingHorizonEstimation(std::shared_ptr<const Model
   last_state_ = setup_.initial_mean;
   base_covariance_ = setup_.initial_covariance;
   // Those of the window and the one before it, one that was prepared, and one to spare.
-  nodes_.assign(intervals + 4, Node{0.0, std::vector<double>(model_->input_count()), outputs_,
-                                    BetweenNodes(model_->output_count(), setup_.problem.most_between)});
+  nodes_.assign(intervals + 4,
+                Node{0.0, std::vector<double>(model_->input_count()), MeasuredOutputs(model_->output_count()),
+                     BetweenNodes(model_->output_count(), setup_.problem.most_between)});
   arrivals_.assign(3, Arrival{-1, arrival_.mean(), arrival_.covariance(), first_starts_});
   reset();
 }
@@ -120,27 +121,27 @@ bool RecedingHorizonEstimation::rebase(const Eigen::VectorXd& mean, const Eigen:
   return true;
 }
 
-void RecedingHorizonEstimation::start(const double* outputs) noexcept {
+void RecedingHorizonEstimation::start(Measured outputs) noexcept {
   reset();
   begin_window(outputs);
 }
 
 /// A window of one node.
-void RecedingHorizonEstimation::begin_window(const double* outputs) noexcept {
+void RecedingHorizonEstimation::begin_window(Measured outputs) noexcept {
   started_ = true;
   remember_arrival();
   remember({}, outputs, window_.first);
-  take_outputs(0, outputs);
+  problem_.set_output(0, outputs);
   set_structure();
   start_cold(point_);
 }
 
-void RecedingHorizonEstimation::remember(const MeasuredInterval& interval, const double* outputs,
+void RecedingHorizonEstimation::remember(const MeasuredInterval& interval, Measured outputs,
                                          std::int64_t number) noexcept {
   Node& kept = node(number);
   kept.duration = interval.duration;
   if (interval.inputs) std::copy_n(interval.inputs, kept.inputs.size(), kept.inputs.data());
-  std::copy_n(outputs, kept.outputs.size(), kept.outputs.data());
+  kept.outputs.assign(outputs);
   kept.between.assign(interval);
 }
 
@@ -158,8 +159,14 @@ void RecedingHorizonEstimation::restore_arrival() noexcept {
   arrival_.restore(kept.mean, kept.covariance);
 }
 
-void RecedingHorizonEstimation::take_outputs(int node, const double* outputs) noexcept {
-  std::copy_n(outputs, outputs_.size(), problem_.output(node));
+/// Whether outputs give other weights to squared residuals than those of a node do.
+bool RecedingHorizonEstimation::weigh_otherwise(int node, Measured outputs) const noexcept {
+  const Measured before = problem_.measured(node);
+  for (std::ptrdiff_t j = 0; j < std::ssize(outputs_); ++j)
+    if (std::isnan(before[j]) != std::isnan(outputs[j]) ||
+        (!std::isnan(outputs[j]) && before.weight(j) != outputs.weight(j)))
+      return true;
+  return false;
 }
 
 void RecedingHorizonEstimation::take_interval(int place, const MeasuredInterval& interval) noexcept {
@@ -245,7 +252,7 @@ void RecedingHorizonEstimation::set_structure() noexcept {
   arrival_.write(problem_);
 }
 
-void RecedingHorizonEstimation::advance_window(const MeasuredInterval& interval, const double* outputs) noexcept {
+void RecedingHorizonEstimation::advance_window(const MeasuredInterval& interval, Measured outputs) noexcept {
   const bool full = window_.intervals == setup_.problem.max_intervals;
   const bool was_empty = window_.intervals == 0;
   if (full) slide_arrival();
@@ -261,7 +268,7 @@ void RecedingHorizonEstimation::advance_window(const MeasuredInterval& interval,
   problem_.set_intervals(last);
   problem_.set_duration(last - 1, interval.duration);
   take_interval(last - 1, interval);
-  take_outputs(last, outputs);
+  problem_.set_output(last, outputs);
   set_structure();
   if (was_empty) {
     for (std::size_t j = 0; j < given_inputs_.size(); ++j) {
@@ -275,7 +282,7 @@ void RecedingHorizonEstimation::advance_window(const MeasuredInterval& interval,
   }
 }
 
-void RecedingHorizonEstimation::add(const MeasuredInterval& interval, const double* outputs) noexcept {
+void RecedingHorizonEstimation::add(const MeasuredInterval& interval, Measured outputs) noexcept {
   if (!started_) {
     start(outputs);
     return;
@@ -295,12 +302,11 @@ void RecedingHorizonEstimation::add(const MeasuredInterval& interval, const doub
   const bool same_duration = std::abs(problem_.duration(last - 1) - interval.duration) <= same_time * interval.duration;
   // The weights of robust losses were those of the predicted outputs, so with them the matrices change too.
   bool fits = same_duration && setup_.problem.robust.empty() && interval.between == 0;
-  for (std::size_t j = 0; j < outputs_.size(); ++j)
-    fits = fits && std::isnan(problem_.output(last)[j]) == std::isnan(outputs[j]);
+  fits = fits && !weigh_otherwise(last, outputs);
   for (std::size_t j = 0; j < given_inputs_.size(); ++j)
     fits = fits && std::isnan(problem_.measured_input(last - 1)[j]) == std::isnan(interval.inputs[given_inputs_[j]]);
   take_interval(last - 1, interval);
-  take_outputs(last, outputs);
+  problem_.set_output(last, outputs);
   if (fits) return;
   problem_.set_duration(last - 1, interval.duration);
   if (!same_duration) problem_.simulate_interval(last - 1, point_, scratch_);
@@ -308,16 +314,14 @@ void RecedingHorizonEstimation::add(const MeasuredInterval& interval, const doub
 }
 
 /// More outputs of the newest node; they replace those that it has.
-void RecedingHorizonEstimation::add_outputs(const double* outputs) noexcept {
+void RecedingHorizonEstimation::add_outputs(Measured outputs) noexcept {
   const int at = window_.intervals - (prepared_ ? 1 : 0);
-  bool masks_change = false;
-  for (std::size_t j = 0; j < outputs_.size(); ++j) {
-    if (std::isnan(outputs[j])) continue;
-    masks_change = masks_change || std::isnan(problem_.output(at)[j]);
-    problem_.output(at)[j] = node(newest()).outputs[j] = outputs[j];
-  }
+  MeasuredOutputs& kept = node(newest()).outputs;
+  kept.add(outputs);
+  const bool weights_change = weigh_otherwise(at, kept.measured());
+  problem_.set_output(at, kept.measured());
   solved_ = solved_ && prepared_;
-  if (masks_change && prepared_) solver_->prepare(point_);
+  if (weights_change && prepared_) solver_->prepare(point_);
 }
 
 int RecedingHorizonEstimation::reach() const noexcept {
@@ -346,7 +350,7 @@ void RecedingHorizonEstimation::rewind(int nodes) noexcept {
   problem_.set_intervals(window_.intervals);
   for (int i = 0; i <= window_.intervals; ++i) {
     const Node& kept = node(window_.first + i);
-    take_outputs(i, kept.outputs.data());
+    problem_.set_output(i, kept.outputs.measured());
     if (i == 0) continue;
     problem_.set_duration(i - 1, kept.duration);
     take_interval(i - 1, kept.between.over(kept.duration, kept.inputs.data()));
@@ -380,7 +384,7 @@ void RecedingHorizonEstimation::prepare() noexcept {
   for (std::size_t j = 0; j < outputs_.size(); ++j)
     if (std::isnan(problem_.output(last)[j])) outputs_[j] = missing_value;
   const double duration = problem_.duration(last - 1);
-  advance_window({duration, inputs_.data()}, outputs_.data());
+  advance_window({duration, inputs_.data()}, {outputs_.data(), problem_.measured(last).weights});
   solver_->prepare(point_);
   prepared_ = true;
 }

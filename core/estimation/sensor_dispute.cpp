@@ -84,7 +84,7 @@ bool SensorWatch::fits(WalkingFilter& filter, const double* outputs) noexcept {
   filter.expect();
   bool fits = true;
   for (std::size_t s = 0; s < sensors_.size(); ++s)
-    if (filter.innovation(sensors_[s], outputs, scratch_))
+    if (filter.innovation(sensors_[s], weighed(outputs), scratch_))
       fits = fits && scratch_.nis <= limit(s, scratch_.value.size());
   return fits;
 }
@@ -126,7 +126,8 @@ double SensorWatch::disputed_nis(WalkingFilter& filter) noexcept {
   filter.expect();
   double sum = 0.0;
   for (std::size_t s = 0; s < sensors_.size(); ++s)
-    if ((findings_[s] & reason::rejected) && filter.innovation(sensors_[s], raw_.data(), scratch_)) sum += scratch_.nis;
+    if ((findings_[s] & reason::rejected) && filter.innovation(sensors_[s], weighed(raw_.data()), scratch_))
+      sum += scratch_.nis;
   return sum;
 }
 
@@ -135,7 +136,8 @@ double SensorWatch::likelihood(WalkingFilter& filter, bool with_rejected) noexce
   filter.expect();
   double sum = 0.0;
   for (std::size_t s = 0; s < sensors_.size(); ++s)
-    if ((with_rejected || !(findings_[s] & reason::rejected)) && filter.innovation(sensors_[s], raw_.data(), scratch_))
+    if ((with_rejected || !(findings_[s] & reason::rejected)) &&
+        filter.innovation(sensors_[s], weighed(raw_.data()), scratch_))
       sum -= 0.5 * (scratch_.nis + log_determinant(scratch_.covariance));
   return sum;
 }
@@ -145,7 +147,7 @@ void SensorWatch::confront(Hypothesis& hypothesis, const double* outputs, bool c
     refute(hypothesis);
     return;
   }
-  hypothesis.filter.update(outputs);
+  hypothesis.filter.update(weighed(outputs));
   hypothesis.explained += counts;
 }
 
@@ -202,7 +204,7 @@ double SensorWatch::consider_slip() noexcept {
     if (disputed_samples_ <= fresh) new_likelihood = likelihood(slip_->filter, true);
   } else if (!fits(slip_->filter, raw_.data()) && goes_on()) {
     go_on_from(edge_->filter, slip_->filter);
-    slip_->filter.update(raw_.data());
+    slip_->filter.update(weighed(raw_.data()));
     edge_->is_active = false;
     return new_likelihood;
   }
@@ -234,7 +236,7 @@ SensorWatch::Finding SensorWatch::settle(double time, const double* outputs) noe
   if (disputed_samples_ == suspect_position && is_position_disputed() && memory_->offsets->has_recent()) {
     // A position that jumps may have drifted before, and what seemed to be off was right.
     memory_->offsets->withdraw_recent(own_->filter);
-    own_->filter.update(outputs);
+    own_->filter.update(weighed(outputs));
     return accept(*own_);
   }
   consider_moved(consider_slip());
@@ -271,7 +273,7 @@ SensorWatch::Finding SensorWatch::settle(double time, const double* outputs) noe
   if (memory_->search && is_place_lost()) {
     // Nothing explains what is measured: the position counts, and all else is found anew.
     start_moved();
-    moved_->filter.update(raw_.data());
+    moved_->filter.update(weighed(raw_.data()));
     make_slip_anew(moved_->filter, setup_.parameter_sigmas);
     search_from(moved_->filter, *memory_->search);
     for (Record& record : records_) record = {};
@@ -332,7 +334,7 @@ void SensorWatch::think_again() noexcept {
   if (!memory_->second_thought || moved_->refuted == 0 || moved_->explained >= informed) return;
   HeadingSearch& search = *memory_->second_thought;
   if (search.is_active()) {
-    const bool is_found = search.update(sensors_, raw_.data());
+    const bool is_found = search.update(sensors_, weighed(raw_.data()));
     memory_->in_vain = search.explained() > 0 ? 0 : memory_->in_vain + 1;
     if (!is_found && memory_->in_vain < stale) return;
     if (is_found) {
@@ -343,7 +345,7 @@ void SensorWatch::think_again() noexcept {
     }
   }
   start_moved();
-  moved_->filter.update(raw_.data());
+  moved_->filter.update(weighed(raw_.data()));
   WalkingFilter& trial = *memory_->trial;
   go_on_from(moved_->filter, trial);
   search_from(trial, search);
@@ -356,7 +358,8 @@ void SensorWatch::hold_back(double time, const double* outputs) noexcept {
   if (held_count_ == static_cast<int>(held_.size())) return;
   Held& held = held_[held_count_++];
   held.time = time;
-  for (std::size_t j = 0; j < raw_.size(); ++j) held.outputs[j] = std::isnan(outputs[j]) ? raw_[j] : Memory::unknown;
+  held.outputs.assign(weighed(raw_.data()));
+  held.outputs.remove(outputs);
 }
 
 void SensorWatch::end_dispute() noexcept {

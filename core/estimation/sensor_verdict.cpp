@@ -17,7 +17,7 @@ constexpr double most_volume = 2.0, volume_memory = 10.0;
 
 }  // namespace
 
-void SensorWatch::judge_late(double time, double* outputs) noexcept {
+void SensorWatch::judge_late(double time, double* outputs, const double* weights) noexcept {
   if (!is_active_) return;
   memory_->offsets->correct(outputs);
   const Memory::Entry* last = nullptr;
@@ -33,7 +33,7 @@ void SensorWatch::judge_late(double time, double* outputs) noexcept {
   filter.predict(last->inputs.data(), time - last->time);
   filter.expect();
   for (std::size_t s = 0; s < sensors_.size(); ++s) {
-    if (!filter.innovation(sensors_[s], outputs, scratch_)) continue;
+    if (!filter.innovation(sensors_[s], {outputs, weights}, scratch_)) continue;
     if (scratch_.nis <= limit(s, scratch_.value.size())) {
       ++states_[s].accepted;
       memory_->offsets->forget_onsets();  // they do not know what it changes

@@ -100,7 +100,8 @@ SensorWatch::SensorWatch(std::shared_ptr<const Model> model, const Setup& setup)
   memory_->first_errors = raw_;
   input_.assign(model->input_count(), 0.0);
   believed_input_ = input_;
-  held_.assign(held_capacity, {0.0, raw_});
+  held_.assign(held_capacity, {0.0, MeasuredOutputs(model->output_count())});
+  raw_weights_.reserve(raw_.size());
   innovations_.resize(innovation_capacity);
   reset();
 }
@@ -217,11 +218,17 @@ void SensorWatch::note_motion(double duration, const double* inputs) noexcept {
   }
 }
 
-SensorWatch::Finding SensorWatch::judge(double time, double* outputs) noexcept {
+/// Values of the present sample, with their weights.
+Measured SensorWatch::weighed(const double* outputs) const noexcept {
+  return {outputs, raw_weights_.empty() ? nullptr : raw_weights_.data()};
+}
+
+SensorWatch::Finding SensorWatch::judge(double time, double* outputs, const double* weights) noexcept {
   memory_->has_advanced = false;
   std::fill(findings_.begin(), findings_.end(), 0u);
   held_count_ = is_disputed_ ? held_count_ : 0;
   Finding finding;
+  raw_weights_.assign(weights, weights ? weights + raw_.size() : nullptr);
   memory_->offsets->correct(outputs);
   if (is_searching()) {
     finding = search_heading(outputs);
@@ -234,7 +241,7 @@ SensorWatch::Finding SensorWatch::judge(double time, double* outputs) noexcept {
     for (std::size_t s = 0; s < sensors_.size(); ++s) {
       const bool has_room = innovation_count_ < static_cast<int>(innovations_.size());
       Innovation& innovation = has_room ? innovations_[innovation_count_] : scratch_;
-      if (!filter.innovation(sensors_[s], outputs, innovation)) continue;
+      if (!filter.innovation(sensors_[s], weighed(outputs), innovation)) continue;
       memory_->offsets->widen(filter, sensors_[s], outputs, innovation);
       innovation_count_ += has_room;
       is_any_measured = true;
@@ -266,8 +273,8 @@ SensorWatch::Finding SensorWatch::judge(double time, double* outputs) noexcept {
         if (!std::isnan(input_[j])) believed_input_[j] = input_[j];
     }
     if (!finding.rebase && !finding.release) {
-      memory_->offsets->take(filter, outputs, std::max(1.0, *std::ranges::max_element(excesses_)));
-      filter.update(outputs);
+      memory_->offsets->take(filter, weighed(outputs), std::max(1.0, *std::ranges::max_element(excesses_)));
+      filter.update(weighed(outputs));
       if (!is_disputed && memory_->offsets->has_suspect()) {
         memory_->offsets->adopt_suspected(filter);
         end_dispute();
@@ -375,7 +382,7 @@ void SensorWatch::search_from(WalkingFilter& filter, HeadingSearch& search) noex
 /// All measurements are used: there is nothing that they could be judged by. Found or not, the best heading so far is
 /// the estimate.
 SensorWatch::Finding SensorWatch::search_heading(const double* outputs) noexcept {
-  memory_->search->update(sensors_, outputs);
+  memory_->search->update(sensors_, weighed(outputs));
   own_->filter.mean() = memory_->search->best().mean();
   own_->filter.covariance() = memory_->search->best().covariance();
   return {.release = false, .rebase = true};

@@ -15,21 +15,24 @@ std::ptrdiff_t node_before(const SmoothedRun& run, double time) {
 
 }  // namespace
 
-void NodeRecorder::append_outputs(const double* outputs) {
+void NodeRecorder::append_outputs(Measured outputs) {
   const int ny = model().output_count();
-  log_->outputs.insert(log_->outputs.end(), outputs, outputs + ny);
+  if (outputs.weights) log_->weights.resize(log_->outputs.size(), 1.0);
+  log_->outputs.insert(log_->outputs.end(), outputs.values, outputs.values + ny);
+  if (outputs.weights) log_->weights.insert(log_->weights.end(), outputs.weights, outputs.weights + ny);
+  if (!log_->weights.empty()) log_->weights.resize(log_->outputs.size(), 1.0);
   log_->states.resize(log_->states.size() + static_cast<std::size_t>(model().state_count()), std::nan(""));
   log_->parameters.resize(log_->parameters.size() + static_cast<std::size_t>(model().parameter_count()), std::nan(""));
 }
 
-void NodeRecorder::start(const double* outputs) noexcept {
+void NodeRecorder::start(Measured outputs) noexcept {
   method_->start(outputs);
   *log_ = {};
   append_outputs(outputs);
   started_ = true;
 }
 
-void NodeRecorder::add(const MeasuredInterval& interval, const double* outputs) noexcept {
+void NodeRecorder::add(const MeasuredInterval& interval, Measured outputs) noexcept {
   if (!started_) {
     start(outputs);
     return;
@@ -37,9 +40,13 @@ void NodeRecorder::add(const MeasuredInterval& interval, const double* outputs) 
   method_->add(interval, outputs);
   const int ny = model().output_count();
   if (!(interval.duration > 0.0) || !std::isfinite(interval.duration)) {
-    double* const newest = log_->outputs.data() + static_cast<std::ptrdiff_t>(log_->intervals()) * ny;
-    for (int j = 0; j < ny; ++j)
-      if (!std::isnan(outputs[j])) newest[j] = outputs[j];
+    const std::size_t newest = static_cast<std::size_t>(log_->intervals()) * static_cast<std::size_t>(ny);
+    if (outputs.weights) log_->weights.resize(log_->outputs.size(), 1.0);
+    for (int j = 0; j < ny; ++j) {
+      if (std::isnan(outputs[j])) continue;
+      log_->outputs[newest + j] = outputs[j];
+      if (!log_->weights.empty()) log_->weights[newest + j] = outputs.weight(j);
+    }
     return;
   }
   log_->durations.push_back(interval.duration);
@@ -64,6 +71,7 @@ void NodeRecorder::rewind(int nodes) noexcept {
   log_->between.erase(log_->between.begin() + left, log_->between.end());
   cut(log_->inputs, left, model().input_count());
   cut(log_->outputs, left + 1, model().output_count());
+  if (!log_->weights.empty()) cut(log_->weights, left + 1, model().output_count());
   cut(log_->states, left + 1, model().state_count());
   cut(log_->parameters, left + 1, model().parameter_count());
 }

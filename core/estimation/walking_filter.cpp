@@ -86,7 +86,7 @@ bool WalkingFilter::depends_on(int output, int state) const noexcept {
   return jacobian_[static_cast<std::size_t>(state) * expected_.size() + output] != 0.0;
 }
 
-bool WalkingFilter::innovation(const Sensor& sensor, const double* outputs, Innovation& result) noexcept {
+bool WalkingFilter::innovation(const Sensor& sensor, Measured outputs, Innovation& result) noexcept {
   const Model& m = filter_.model();
   const int nx = m.state_count(), ny = m.output_count();
   int measured[most_sensor_outputs], count = 0;
@@ -100,7 +100,7 @@ bool WalkingFilter::innovation(const Sensor& sensor, const double* outputs, Inno
     result.value[a] =
         m.description().outputs[j].is_angle ? angle_difference(outputs[j], expected_[j]) : outputs[j] - expected_[j];
     for (int b = 0; b < count; ++b) {
-      double sum = a == b ? filter_.noise().output_variances[j] : 0.0;
+      double sum = a == b ? filter_.noise().output_variances[j] / outputs.weight(j) : 0.0;
       for (int c = 0; c < nx; ++c) sum += jacobian_[c * ny + j] * image_(c, measured[b]);
       result.covariance(a, b) = sum;
     }

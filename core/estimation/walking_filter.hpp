@@ -33,7 +33,7 @@ class WalkingFilter {
   void predict(const double* inputs, double duration, const double* more_sigmas = nullptr,
                Eigen::MatrixXd* deviations = nullptr) noexcept;
   /// Uses outputs (n_y, NaN where missing).
-  void update(const double* outputs) noexcept { filter_.update(outputs, nullptr); }
+  void update(Measured outputs) noexcept { filter_.update(outputs); }
   /// Makes a parameter anew: its mean stays, with this standard deviation.
   void restart_parameter(int parameter, double sigma) noexcept { filter_.restart_parameter(parameter, sigma * sigma); }
 
@@ -41,7 +41,7 @@ class WalkingFilter {
   void expect() noexcept;
   /// Innovation of a sensor's measured outputs by what was expected last, its covariance and NIS. False, and nothing
   /// else, where none is measured.
-  bool innovation(const Sensor& sensor, const double* outputs, Innovation& result) noexcept;
+  bool innovation(const Sensor& sensor, Measured outputs, Innovation& result) noexcept;
   /// Whether an expected output depends on a state.
   bool depends_on(int output, int state) const noexcept;
   double expected(int output) const noexcept { return expected_[output]; }

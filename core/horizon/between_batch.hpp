@@ -51,6 +51,7 @@ struct RheProblem::BetweenBatch {
     weight = scratch.take(problem.output_row_);
     pull = scratch.take(problem.output_row_);
     curvature = scratch.take(problem.output_row_);
+    output_weights = scratch.take(problem.output_row_);
     of_outputs = scratch.take(static_cast<std::ptrdiff_t>(ny) * row);
     gradients =
         scratch.take(std::max({ny, nx, PointSums::most_points}) * static_cast<std::ptrdiff_t>(problem.stride()));
@@ -67,7 +68,7 @@ struct RheProblem::BetweenBatch {
                       of_states = padded(problem.nx()), stride = problem.stride(), most = PointSums::most_points;
     const std::size_t interval = row * (3 + nx + row) + 8 + padded(problem.model().data_count());
     const std::size_t each = 4 * problem.output_row_ + (ny + nx) * of_states;
-    return at_once * (interval + each) + 5 * problem.output_row_ + (std::max({ny, nx, most}) + nx) * stride + ny * row +
+    return at_once * (interval + each) + 6 * problem.output_row_ + (std::max({ny, nx, most}) + nx) * stride + ny * row +
            most * (problem.output_row_ + ny * row) + ny * PointSums::Kept::size +
            problem.setup_.most_between * (padded(PointSums::most_points) + problem.output_row_) +
            PointSums::size(problem.ny_) + problem.model().rows_scratch(at_once) + 16;
@@ -131,7 +132,7 @@ struct RheProblem::BetweenBatch {
   std::array<double, at_once> share{};  ///< of the interval's duration
   double *z, *next, *jacobians, *multipliers, *hessians, *durations, *data;
   double *outputs, *output_jacobians, *pulls, *weights, *curvatures, *output_hessians, *difference, *predicted, *weight,
-      *pull, *curvature, *of_outputs, *gradients, *product;
+      *pull, *curvature, *output_weights, *of_outputs, *gradients, *product;
   double *said, *parts, *known_weights, *kept;  ///< room for one interval with points: see OfPoints
   PointSums sums;
   double* rest;

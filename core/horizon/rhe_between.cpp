@@ -71,8 +71,10 @@ void RheProblem::linearise_between(int interval, const Iterate& iterate, double*
   BetweenBatch batch(*this, scratch.data());
   const auto take = [&](int k, const double* gradients) {
     residual(between(interval).outputs(k), batch.predicted, batch.difference);
-    losses(batch.difference, batch.weight, nullptr);
-    std::copy_n(batch.weight, ny_, weights + static_cast<std::ptrdiff_t>(k) * ny_);
+    losses(batch.difference, weights_between(interval, k, batch.output_weights), batch.weight, nullptr);
+    const Measured measured = between(interval).measured(k);
+    for (int j = 0; j < ny_; ++j)
+      weights[static_cast<std::ptrdiff_t>(k) * ny_ + j] = batch.weight[j] * measured.weight(j);
     for (int j = 0; rows && j < ny_; ++j) {
       *rows++ = batch.difference[j];
       rows = std::copy_n(gradients + j * batch.width, batch.nz, rows);
@@ -102,14 +104,24 @@ void RheProblem::linearise_between(int interval, const Iterate& iterate, double*
   flush();
 }
 
-/// Weights of a measurement's outputs in H, and their pulls in h; returns the cost.
-double RheProblem::weigh(const double* measured, const double* predicted, double* difference, double* weights,
+/// Weights of the squared residuals of a measurement between nodes; `room`: for a row.
+const double* RheProblem::weights_between(int interval, int place, double* room) const noexcept {
+  const double* const weights = between(interval).weights(place);
+  if (!weights) return output_weights_.data();
+  for (int j = 0; j < ny_; ++j) room[j] = output_weights_[j] * weights[j];
+  return room;
+}
+
+/// Weights of a measurement's outputs in H, and their pulls in h; returns the cost. Writes `batch.difference`.
+double RheProblem::weigh(BetweenBatch& batch, int interval, int place, const double* predicted, double* weights,
                          double* pulls, double* curvatures) const noexcept {
-  residual(measured, predicted, difference);
-  const double cost = losses(difference, weights, curvatures);
+  const double *const measured = between(interval).outputs(place), *const output_weights = weights_between(
+                                                                       interval, place, batch.output_weights);
+  residual(measured, predicted, batch.difference);
+  const double cost = losses(batch.difference, output_weights, weights, curvatures);
   for (int j = 0; j < ny_; ++j) {
-    weights[j] = std::isnan(measured[j]) ? 0.0 : 2.0 * weights[j] * setup_.output_weights[j];
-    pulls[j] = weights[j] * difference[j];
+    weights[j] = std::isnan(measured[j]) ? 0.0 : 2.0 * weights[j] * output_weights[j];
+    pulls[j] = weights[j] * batch.difference[j];
   }
   return cost;
 }
@@ -178,7 +190,7 @@ double RheProblem::add_known_between(StageRange range, const Iterate& iterate, c
     }
     for (int k = 0; k < between(i).count(); ++k) {
       const double* const results = known.results(i, k);
-      total += weigh(between(i).outputs(k), results, batch.difference, batch.weight, batch.pull, nullptr);
+      total += weigh(batch, i, k, results, batch.weight, batch.pull, nullptr);
       add_rows(batch, i, results + output_row_, ny_, batch.weight, batch.pull, view);
     }
   }
@@ -194,7 +206,7 @@ void RheProblem::write_parts(int interval, int place, double* parts) const noexc
 double RheProblem::add_points(BetweenBatch& batch, int interval, const OfPoints& points,
                               const CostView* view) const noexcept {
   batch.sums.begin(points.said, points.said_step);
-  const bool may_know = points.holds_for && view && setup_.robust.empty();
+  const bool may_know = points.holds_for && view && setup_.robust.empty() && !between(interval).has_weights();
   const double total = may_know ? sum_up_known(batch, interval, points) : sum_up(batch, interval, points, view);
   if (!view) return total;
   for (int j = 0; j < ny_; ++j) {
@@ -223,7 +235,7 @@ double RheProblem::sum_up(BetweenBatch& batch, int interval, const OfPoints& poi
   for (int m = 0; m < measured.count(); ++m) {
     const double* const parts = points.parts + m * points.parts_step;
     batch.sums.predict(parts, batch.predicted);
-    total += weigh(measured.outputs(m), batch.predicted, batch.difference, batch.weight, batch.pull, nullptr);
+    total += weigh(batch, interval, m, batch.predicted, batch.weight, batch.pull, nullptr);
     if (view) batch.sums.add_pulls(parts, batch.pull);
     if (!view || !view->H) continue;
     double* const known = points.weights + m * points.weights_step;
@@ -231,6 +243,7 @@ double RheProblem::sum_up(BetweenBatch& batch, int interval, const OfPoints& poi
     std::copy_n(batch.weight, ny_, known);
   }
   if (!has_new_weights) return total;
+  if (points.holds_for) *points.holds_for = nothing_kept;
   // Without robust losses, and as long as nothing new is measured, weights are those that they were before.
   batch.sums.begin_weights();
   for (int m = 0; m < measured.count(); ++m)
@@ -264,7 +277,7 @@ double RheProblem::sum_up_known(BetweenBatch& batch, int interval, const OfPoint
   for (int m = 0; m < measured.count(); ++m) {
     const double* const parts = points.parts + m * points.parts_step;
     batch.sums.predict(parts, batch.predicted);
-    weigh(measured.outputs(m), batch.predicted, batch.difference, batch.weight, batch.pull, nullptr);
+    weigh(batch, interval, m, batch.predicted, batch.weight, batch.pull, nullptr);
     batch.sums.add_pulls(parts, batch.pull);
     batch.sums.add_weights(parts, batch.weight);
     for (int j = 0; j < ny_; ++j) {
@@ -277,6 +290,7 @@ double RheProblem::sum_up_known(BetweenBatch& batch, int interval, const OfPoint
     batch.sums.keep(j, costs[j], largest[j], kept(j));
     total += costs[j];
   }
+  points.weights[0] = no_sums;
   *known_count = measured.count();
   std::copy_n(setup_.output_weights.data(), ny_, known_weights);
   std::memcpy(known_outputs, measured.outputs(0), count * sizeof(double));
@@ -309,8 +323,8 @@ double RheProblem::add_batch(BetweenBatch& batch, Hessian hessian, const CostVie
       for (int k = 0; view && k < batch.point_count; ++k)
         for (int j = 0; j < ny_; ++j) batch.pulls[at + k * output_row_ + j] = batch.sums.pulls(j)[k];
     } else {
-      cost = weigh(between(interval).outputs(batch.place[i]), batch.outputs + at, batch.difference, batch.weights + at,
-                   batch.pulls + at, batch.curvatures + at);
+      cost = weigh(batch, interval, batch.place[i], batch.outputs + at, batch.weights + at, batch.pulls + at,
+                   batch.curvatures + at);
       if (view) {
         batch.write_gradients(i, batch.of_outputs);
         add_rows(batch, interval, batch.of_outputs, ny_, batch.weights + at, batch.pulls + at, *view);
@@ -373,17 +387,18 @@ void RheProblem::add_rows(BetweenBatch& batch, int interval, const double* rows,
 
 /// Second derivatives of robust losses: 4 rho'' (J' W r)(J' W r)' for each measurement.
 void RheProblem::add_curvature_of_losses(BetweenBatch& batch, const CostView& view) const noexcept {
-  const auto add = [&](int interval, const double* measured, const double* gradients) {
+  const auto add = [&](int interval, int place, const double* gradients) {
     const int columns = capacity().states + control_count(interval);
     const IntervalDynamics dynamics{model(), structure(), nullptr, nullptr, substeps()};
-    weigh(measured, batch.predicted, batch.difference, batch.weight, batch.pull, batch.curvature);
+    weigh(batch, interval, place, batch.predicted, batch.weight, batch.pull, batch.curvature);
+    const double* const output_weights = weights_between(interval, place, batch.output_weights);
     double* const H = H_of(view, interval);
     for (const RobustLoss& loss : setup_.robust) {
       std::fill_n(batch.product, padded(columns), 0.0);
       for (const int j : loss.outputs)
         for (int z = 0; z < batch.nz; ++z)
           batch.product[dynamics.column_of(interval, z)] +=
-              gradients[j * batch.width + z] * setup_.output_weights[j] * batch.difference[j];
+              gradients[j * batch.width + z] * output_weights[j] * batch.difference[j];
       const double scale = 4.0 * batch.curvature[loss.outputs.front()];
       for (int c = 0; c < columns; ++c)
         for (int r = 0; r < columns; ++r) H[c * stride() + r] += scale * batch.product[r] * batch.product[c];
@@ -394,7 +409,7 @@ void RheProblem::add_curvature_of_losses(BetweenBatch& batch, const CostView& vi
     if (!batch.is_point[i]) {
       batch.write_gradients(i, batch.of_outputs);
       std::copy_n(batch.outputs + static_cast<std::ptrdiff_t>(i) * output_row_, output_row_, batch.predicted);
-      add(batch.interval[i], measured.outputs(batch.place[i]), batch.of_outputs);
+      add(batch.interval[i], batch.place[i], batch.of_outputs);
       continue;
     }
     batch.write_points(i, output_row_);
@@ -403,7 +418,7 @@ void RheProblem::add_curvature_of_losses(BetweenBatch& batch, const CostView& vi
       write_parts(batch.interval[i], m, parts);
       batch.combine(parts, batch.said, output_row_, batch.predicted);
       batch.combine(parts, batch.said + output_row_, batch.said_size - output_row_, batch.of_outputs);
-      add(batch.interval[i], measured.outputs(m), batch.of_outputs);
+      add(batch.interval[i], m, batch.of_outputs);
     }
   }
 }

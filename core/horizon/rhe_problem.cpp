@@ -96,12 +96,36 @@ RheProblem::RheProblem(std::shared_ptr<const Model> model, Setup setup)
   between_.assign(nodes - 1, BetweenNodes(ny_, setup_.most_between));
   between_points_ = points_of_interval();
   outputs_.assign(nodes * output_row_, missing);
+  weights_.assign(outputs_.size(), 1.0);
+  node_weights_.assign(outputs_.size(), 0.0);
   measured_inputs_.assign(nodes * stride(), missing);
   input_weights_.assign(stride(), 0.0);
   std::copy(setup_.input_weights.begin(), setup_.input_weights.end(), input_weights_.begin() + capacity().states);
   for (auto* v : {&link_information_, &block_weights_}) v->assign(nodes * np(), 0.0);
   arrival_mean = Eigen::VectorXd::Zero(nx() + np());
   arrival_information = Eigen::MatrixXd::Zero(nx() + np(), nx() + np());
+}
+
+void RheProblem::set_output(int node, Measured measured) noexcept {
+  std::copy_n(measured.values, ny_, output(node));
+  if (!measured.weights && !has_weights_) return;
+  double* const weights = weights_.data() + at_output(node);
+  for (int j = 0; j < ny_; ++j) weights[j] = measured.weight(j);
+  if (!has_weights_) {
+    has_weights_ = true;
+    weigh_nodes();
+  }
+  for (int j = 0; j < ny_; ++j) node_weights_[at_output(node) + j] = output_weights_[j] * weights[j];
+}
+
+void RheProblem::set_output_weight(int output, double weight) noexcept {
+  setup_.output_weights[output] = output_weights_[output] = weight;
+  if (has_weights_) weigh_nodes();
+}
+
+void RheProblem::weigh_nodes() noexcept {
+  for (std::size_t row = 0; row < weights_.size(); row += output_row_)
+    for (int j = 0; j < ny_; ++j) node_weights_[row + j] = output_weights_[j] * weights_[row + j];
 }
 
 void RheProblem::set_blocks(int parameter, const std::uint8_t* begins, Transition transition) noexcept {
@@ -165,6 +189,9 @@ void RheProblem::take_data(const RheProblem& from) noexcept {
   setup_.output_weights = from.setup_.output_weights;
   output_weights_ = from.output_weights_;
   outputs_ = from.outputs_;
+  has_weights_ = from.has_weights_;
+  weights_ = from.weights_;
+  node_weights_ = from.node_weights_;
   for (std::size_t i = 0; i < between_.size(); ++i) between_[i].assign(from.between_[i]);
   measured_inputs_ = from.measured_inputs_;
   link_information_ = from.link_information_;
@@ -181,7 +208,8 @@ void RheProblem::drop_first_interval() noexcept {
   }
   if (setup_.most_between > 0 && intervals() > 0)
     std::rotate(between_.begin(), between_.begin() + 1, between_.begin() + intervals());
-  std::copy(outputs_.begin() + output_row_, outputs_.end(), outputs_.begin());
+  for (AlignedDoubles* rows : {&outputs_, &weights_, &node_weights_})
+    if (has_weights_ || rows == &outputs_) std::copy(rows->begin() + output_row_, rows->end(), rows->begin());
   std::copy(measured_inputs_.begin() + stride(), measured_inputs_.end(), measured_inputs_.begin());
 }
 
@@ -204,16 +232,17 @@ void RheProblem::residual(const double* y, const double* predicted, double* diff
   }
 }
 
-double RheProblem::losses(const double* difference, double* weight, double* curvature) const noexcept {
+double RheProblem::losses(const double* difference, const double* output_weights, double* weight,
+                          double* curvature) const noexcept {
   double total = 0.0;
   for (int j = 0; j < ny_; ++j) {
     weight[j] = 1.0;
     if (curvature) curvature[j] = 0.0;
-    if (robust_group_[j] < 0) total += setup_.output_weights[j] * difference[j] * difference[j];
+    if (robust_group_[j] < 0) total += output_weights[j] * difference[j] * difference[j];
   }
   for (const RobustLoss& loss : setup_.robust) {
     double s = 0.0;
-    for (const int j : loss.outputs) s += setup_.output_weights[j] * difference[j] * difference[j];
+    for (const int j : loss.outputs) s += output_weights[j] * difference[j] * difference[j];
     const double root = std::sqrt(1.0 + s / (loss.delta * loss.delta));
     // 2 delta^2 (root - 1), without cancellation for small s
     total += 2.0 * s / (1.0 + root);
@@ -245,7 +274,7 @@ double RheProblem::cost(const Iterate& iterate, double* stage_costs, std::span<d
   add(0, arrival_term(iterate, nullptr));
   for (int i = 0; i < count; ++i) {
     residual(output(i), predicted + i * output_row_, difference);
-    add(i, losses(difference, weight, nullptr));
+    add(i, losses(difference, weights_at(i), weight, nullptr));
   }
   for (int i = 0; i < intervals(); ++i) {
     add(i, inputs(i, iterate, nullptr, nullptr));
@@ -370,7 +399,8 @@ double RheProblem::write_measurements(StageRange range, const Iterate& iterate, 
                                  .inputs = measured_inputs_.data(),
                                  .predicted = predicted,
                                  .jacobians = jacobians,
-                                 .output_weights = output_weights_.data(),
+                                 .output_weights = weights_at(range.first),
+                                 .output_weights_step = has_weights_ ? output_row_ : 0,
                                  .input_weights = input_weights_.data(),
                                  .periods = output_periods_.data(),
                                  .inverse_periods = output_inverse_periods_.data(),
@@ -420,12 +450,12 @@ double RheProblem::write_general_measurements(StageRange range, const Iterate& i
   for (int i = 0; i < count; ++i) {
     const int node = range.first + i;
     residual(output(node), predicted + i * output_row_, difference);
-    total += losses(difference, weight, curvature);
-    const double* y = output(node);
+    const double *const y = output(node), *const output_weights = weights_at(node);
+    total += losses(difference, output_weights, weight, curvature);
     const double* J = jacobians + static_cast<std::ptrdiff_t>(i) * ny_ * width;
     double* H = H_of(view, node);
     for (int j = 0; j < ny_; ++j) {
-      w[j] = std::isnan(y[j]) ? 0.0 : 2.0 * weight[j] * setup_.output_weights[j];
+      w[j] = std::isnan(y[j]) ? 0.0 : 2.0 * weight[j] * output_weights[j];
       multipliers[i * output_row_ + j] = w[j] * difference[j];
     }
     transcription_kernels().add_products(J, w, multipliers + i * output_row_, ny_, n, stride(), H, h_of(view, node));
@@ -436,8 +466,8 @@ double RheProblem::write_general_measurements(StageRange range, const Iterate& i
         for (int r = 0; r < n; ++r) {
           double left = 0.0, right = 0.0;
           for (const int j : loss.outputs) {
-            left += J[j * width + r] * setup_.output_weights[j] * difference[j];
-            right += J[j * width + c] * setup_.output_weights[j] * difference[j];
+            left += J[j * width + r] * output_weights[j] * difference[j];
+            right += J[j * width + c] * output_weights[j] * difference[j];
           }
           H[c * stride() + r] += 4.0 * curvature[loss.outputs.front()] * left * right;
         }
@@ -503,7 +533,7 @@ void RheProblem::robust_weights(const Iterate& iterate, int node, double* weight
   request.outputs = predicted;
   model().observe(request);
   residual(output(node), predicted, difference);
-  losses(difference, weights, nullptr);
+  losses(difference, weights_at(node), weights, nullptr);
 }
 
 }  // namespace rhec

@@ -209,12 +209,13 @@ template <bool matrices, bool vectors, class Width>
 RHEC_ALWAYS_INLINE inline Lanes write_node(const MeasurementView& measured, long node, const double* seen,
                                            const double* predicted, const double* J, int stride, int used,
                                            bool is_clean, double* H, double* h) {
+  const double* const output_weights = measured.output_weights + node * measured.output_weights_step;
   const int count = Width::count(measured.output_count), outputs = Width::of(count),
             states = Width::of(measured.vehicle_states);
   double *weights = measured.room, *pulls = measured.pulls ? measured.pulls + node * outputs : weights + outputs;
   Lanes total{};
   for (int k = 0; k < outputs; k += lane_count) {
-    const Lanes y = load(seen + k), weight = y == y ? 2.0 * load(measured.output_weights + k) : Lanes{};
+    const Lanes y = load(seen + k), weight = y == y ? 2.0 * load(output_weights + k) : Lanes{};
     if (matrices) store(weight, weights + k);
     if (!vectors) continue;
     Lanes error = load(predicted + k) - y;

@@ -26,6 +26,7 @@ struct RawEvent {
   Stamp arrival = no_stamp, stamp = no_stamp;
   bool is_output = false;
   std::size_t values = 0;
+  bool has_sigmas = false;
 };
 
 class DriveReader {
@@ -55,8 +56,9 @@ class DriveReader {
   void take(const Record& record) {
     for (const SignalRow& row : stream_.take(record)) {
       const Stamp arrival = record.received == no_stamp ? row.stamp : record.received;
-      raw_.push_back({arrival, row.stamp, row.is_output, drive_.values.size()});
-      drive_.values.insert(drive_.values.end(), row.values.begin(), row.values.end());
+      raw_.push_back({arrival, row.stamp, row.is_output, drive_.values.size(), !row.sigmas.empty()});
+      for (const std::vector<double>* each : {&row.values, &row.sigmas})
+        drive_.values.insert(drive_.values.end(), each->begin(), each->end());
     }
   }
 
@@ -73,7 +75,8 @@ class DriveReader {
     drive_.start = std::abs(seconds_between(0, first)) < since_1970 ? 0 : first;
     for (const RawEvent& each : raw_)
       drive_.events.push_back({seconds_between(drive_.start, each.arrival) - shift,
-                               seconds_between(drive_.start, each.stamp), each.is_output, each.values});
+                               seconds_between(drive_.start, each.stamp), each.is_output, each.values,
+                               each.has_sigmas});
     std::stable_sort(drive_.events.begin(), drive_.events.end(),
                      [](const DriveEvent& a, const DriveEvent& b) { return a.arrival < b.arrival; });
     join_inputs();

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <cmath>
 #include <optional>
 #include <string_view>
 #include <vector>
@@ -211,6 +212,13 @@ void append_section(const char* name, const std::vector<Variable>& variables, bo
 
 /// What to do where a receiver's fixes are now better, now worse.
 void append_grades(const TopicSurvey& fixes, std::string& text) {
+  constexpr double by_much = 4.0;
+  const auto variance = std::ranges::find(fixes.fields, "position_covariance[0]", &FieldSurvey::name);
+  if (variance != fixes.fields.end() && variance->least >= 0.0 && variance->most > by_much * variance->least)
+    text += fmt::format(
+        "    # {0} says how accurate its fixes are: {1:.2g} to {2:.2g} m to the east. They count by that with\n"
+        "    #   variance: \"{0}:position_covariance[0]\", and [4] to the north\n",
+        fixes.topic.name, std::sqrt(variance->least), std::sqrt(variance->most));
   const auto status = std::ranges::find(fixes.fields, "status.status", &FieldSurvey::name);
   if (status == fixes.fields.end() || status->count == 0 || std::max(status->least, 0.0) >= status->most) return;
   text += fmt::format(

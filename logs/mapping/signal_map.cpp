@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <span>
 #include <utility>
 
@@ -83,13 +84,32 @@ std::vector<SignalCondition> conditions_in(const Settings& when) {
 
 /// A condition is looked at in the records that have the value.
 void check_topics(const MappedSignal& signal) {
-  for (const SignalCondition& condition : signal.conditions)
+  const auto check = [&](const SignalName& of, const Settings& key) {
     for (const SignalName& from : signal.from)
-      if (from.topic != condition.of.topic)
-        throw signal.options.when.error(
-            fmt::format("'{}{}{}' is in other records than the value itself; expected a signal {}", condition.of.topic,
-                        condition.of.topic.empty() ? "" : ":", condition.of.field,
-                        from.topic.empty() ? "of the table" : "of " + from.topic));
+      if (from.topic != of.topic)
+        throw key.error(fmt::format("'{}{}{}' is in other records than the value itself; expected a signal {}",
+                                    of.topic, of.topic.empty() ? "" : ":", of.field,
+                                    from.topic.empty() ? "of the table" : "of " + from.topic));
+  };
+  for (const SignalCondition& condition : signal.conditions) check(condition.of, signal.options.when);
+  if (signal.accuracy)
+    check(signal.accuracy->of, signal.accuracy->is_variance ? signal.options.variance : signal.options.sigma);
+}
+
+/// `sigma` or `variance`: what records say of their own accuracy.
+void set_accuracy(MappedSignal& signal) {
+  const SignalOptions& options = signal.options;
+  const bool is_variance = !options.variance.is_null();
+  const Settings& key = is_variance ? options.variance : options.sigma;
+  if (key.is_null()) return;
+  if (is_variance && !options.sigma.is_null()) throw key.error("found beside `sigma`; expected one of them");
+  if (!signal.is_output) throw key.error("is for outputs; the noise of an input is that of the scenario");
+  if (key.kind() != Settings::Kind::scalar)
+    throw key.mismatch("a signal, such as /fix:position_covariance[0] or the name of a column");
+  signal.accuracy = {parse_signal_name(key.as_text()), is_variance};
+  if (signal.accuracy->of.field.empty())
+    throw key.error(fmt::format("'{}' is a topic; expected one of its fields, e.g. '{}:position_covariance[0]'",
+                                signal.accuracy->of.topic, signal.accuracy->of.topic));
 }
 
 void check_count(const MappedSignal& signal, const Settings& entry) {
@@ -188,6 +208,17 @@ const OptionTable<SignalOptions>& SignalOptions::table() {
               "when", &SignalOptions::when,
               "values count only in records in which this holds: `{of: SIGNAL, at_least: NUMBER, at_most: NUMBER}`, "
               "or a list of such, of the same topic or table; e.g. the status or covariance of a fix")
+          .subtree("sigma", &SignalOptions::sigma,
+                   "of an output: the signal, of the same topic or table, that says how accurate a record is: its "
+                   "standard deviation, in the unit of the signal; records in which it is not above 0 are as "
+                   "`noise.outputs` says")
+          .subtree("variance", &SignalOptions::variance,
+                   "the same of its variance, as messages have it: `/fix:position_covariance[0]`")
+          .number("sigma_scale", &SignalOptions::sigma_scale,
+                  "what stated standard deviations are multiplied by: above 1 for a receiver that claims too much",
+                  greater_than(0.0))
+          .number("least_sigma", &SignalOptions::least_sigma,
+                  "the least standard deviation that is believed, in the variable's unit", at_least(0.0))
           .text("clock", &SignalOptions::clock,
                 "what says when it was measured: `received`, or a field or column that counts seconds (`name [ms]`: "
                 "others); empty: `signals.clock`");
@@ -260,8 +291,10 @@ void SignalMap::add(const Settings& map, const std::vector<Variable>& variables,
         check_count(signal, *entry);
       }
       if (!signal.options.when.is_null()) signal.conditions = conditions_in(signal.options.when);
+      set_accuracy(signal);
       check_topics(signal);
       set_factor(signal, *entry);
+      signal.sigma_factor = signal.options.sigma_scale * std::abs(signal.factor);
     }
     signals_.push_back(std::move(signal));
     is_none_.push_back(is_none);

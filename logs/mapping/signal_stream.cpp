@@ -31,7 +31,8 @@ struct SignalStream::Channel {
   MappedSignal signal;
   std::vector<double> fields;
   std::vector<bool> is_fresh;
-  double last = no_value;  ///< of a derivative: the value before
+  double last = no_value;   ///< of a derivative: the value before
+  double sigma = no_value;  ///< stated in the last record
   Stamp last_stamp = no_stamp, newest = no_stamp;
   SignalCount count;
 };
@@ -52,6 +53,12 @@ struct SignalStream::Reading {
     SignalCondition condition;
   };
   std::vector<Check> checks;
+  /// How accurate a record says that it is, and the slot of what is 0 where that means nothing.
+  struct Accuracy {
+    std::size_t channel, slot;
+    std::optional<std::size_t> kind;
+  };
+  std::vector<Accuracy> accuracies;
   double least_lateness = std::numeric_limits<double>::infinity();
 
   /// Where the value of a field will be; asks for it if nobody has.
@@ -98,11 +105,20 @@ void SignalStream::add(const Log& log, MappedSignal signal) {
     Reading& reading = reading_of(log.topic(condition.of.topic), signal.options.clock);
     reading.checks.push_back({channels_.size(), reading.slot_of(condition.of.field), condition});
   }
+  note_accuracy(log, signal, type);
   channel.fields.assign(fields.size(), no_value);
   channel.is_fresh.assign(fields.size(), false);
   channel.count = {signal.variable.name, source_of(signal), signal.is_output};
   channel.signal = std::move(signal);
   channels_.push_back(std::move(channel));
+}
+
+void SignalStream::note_accuracy(const Log& log, const MappedSignal& signal, const std::string& type) {
+  if (!signal.accuracy) return;
+  Reading& reading = reading_of(log.topic(signal.accuracy->of.topic), signal.options.clock);
+  Reading::Accuracy accuracy{channels_.size(), reading.slot_of(signal.accuracy->of.field), {}};
+  if (const std::string kind = kind_of_accuracy(signal, type); !kind.empty()) accuracy.kind = reading.slot_of(kind);
+  reading.accuracies.push_back(accuracy);
 }
 
 SignalStream::Reading& SignalStream::reading_of(int topic, const std::string& clock) {
@@ -134,7 +150,12 @@ void SignalStream::read(const Record& record, Reading& reading) {
   if (stamp == no_stamp) return;
   const Stamp arrival = record.received == no_stamp ? stamp : record.received;
   reading.least_lateness = std::min(reading.least_lateness, seconds_between(stamp, arrival));
-  values_.clear();
+  completed_.clear();
+  for (const Reading::Accuracy& each : reading.accuracies) {
+    Channel& channel = channels_[each.channel];
+    const bool means_nothing = each.kind && reading.values[*each.kind] == 0.0;
+    channel.sigma = means_nothing ? no_value : stated_sigma(channel.signal, reading.values[each.slot]);
+  }
   for (const Reading::Use& use : reading.uses) {
     Channel& channel = channels_[use.channel];
     if (!reading.counts_for(use.channel)) {
@@ -152,7 +173,7 @@ void SignalStream::read(const Record& record, Reading& reading) {
     if (std::find(channel.is_fresh.begin(), channel.is_fresh.end(), false) == channel.is_fresh.end())
       complete(channel, channel.newest);
   }
-  for (auto& [key, values] : values_) rows_.push_back({!key.first, key.second, std::move(values)});
+  for (auto& [key, row] : completed_) rows_.push_back(std::move(row));
 }
 
 /// All that makes up a signal has come.
@@ -183,9 +204,16 @@ void SignalStream::complete(Channel& channel, Stamp stamp) {
 void SignalStream::put(Channel& channel, Stamp stamp, double value) {
   ++channel.count.values;
   const bool is_output = channel.signal.is_output;
-  std::vector<double>& values = values_[{!is_output, stamp}];
-  if (values.empty()) values.assign(is_output ? outputs_ : inputs_, no_value);
-  values[static_cast<std::size_t>(channel.signal.index)] = value;
+  SignalRow& row = completed_[{!is_output, stamp}];
+  const auto index = static_cast<std::size_t>(channel.signal.index);
+  if (row.values.empty()) row = {is_output, stamp, std::vector<double>(is_output ? outputs_ : inputs_, no_value), {}};
+  row.values[index] = value;
+  if (std::isnan(channel.sigma)) return;
+  ++channel.count.stated;
+  channel.count.least_sigma = std::min(channel.count.least_sigma, channel.sigma);
+  channel.count.most_sigma = std::max(channel.count.most_sigma, channel.sigma);
+  row.sigmas.resize(outputs_, no_value);
+  row.sigmas[index] = channel.sigma;
 }
 
 std::vector<SignalCount> SignalStream::counts() const {

@@ -1,5 +1,6 @@
 #include "signal_value.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -72,6 +73,18 @@ double value_of(const MappedSignal& signal, std::span<const double> fields, std:
   value *= signal.factor;
   if (!signal.options.derivative) value += signal.options.offset;
   return std::isfinite(value) ? value : missing;
+}
+
+double stated_sigma(const MappedSignal& signal, double stated) noexcept {
+  if (!(stated > 0.0)) return missing;  // messages have 0 and -1 for what is not known
+  const double sigma = signal.accuracy->is_variance ? std::sqrt(stated) : stated;
+  return std::max(signal.sigma_factor * sigma, signal.options.least_sigma);
+}
+
+std::string kind_of_accuracy(const MappedSignal& signal, const std::string& type) {
+  // 0: COVARIANCE_TYPE_UNKNOWN
+  const bool is_of_fix = type == type_of_fix && signal.accuracy->of.field.starts_with("position_covariance[");
+  return is_of_fix ? "position_covariance_type" : "";
 }
 
 }  // namespace rhec::logs

@@ -18,4 +18,9 @@ std::vector<SignalName> fields_of(const MappedSignal& signal, const std::string&
 /// local plane where there is none.
 double value_of(const MappedSignal& signal, std::span<const double> fields, std::optional<LocalPlane>& plane);
 
+/// The standard deviation of a signal's value from what a record states; NaN where that says nothing.
+double stated_sigma(const MappedSignal& signal, double stated) noexcept;
+/// The field that is 0 in records whose stated accuracy means nothing; empty where there is none.
+std::string kind_of_accuracy(const MappedSignal& signal, const std::string& type);
+
 }  // namespace rhec::logs

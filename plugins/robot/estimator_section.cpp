@@ -262,6 +262,7 @@ std::unique_ptr<Estimator> EstimatorSection::make(const std::optional<Eigen::Vec
   Estimator::Timeline timeline;
   timeline.longest_interval = parts_.context->step;
   timeline.delays = delays_;
+  timeline.output_sigmas = parts_.context->noise.output_sigmas;
   const EstimatorMaker& maker = makers_.named(options_.name);
   auto method = hooks.wrap_method(maker.make(with_hooks));
   auto watch = make_watch_for(maker, with_hooks);

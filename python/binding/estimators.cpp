@@ -58,10 +58,12 @@ std::shared_ptr<NamedEstimator> make_estimator(const std::shared_ptr<RobotObject
   return made;
 }
 
-void push_measurement(NamedEstimator& self, double time, const Numbers& outputs) {
-  const double* values = vector_of(outputs, self.robot->robot.model()->description().outputs, "outputs");
+void push_measurement(NamedEstimator& self, double time, const Numbers& outputs, const std::optional<Numbers>& sigmas) {
+  const std::vector<Variable>& variables = self.robot->robot.model()->description().outputs;
+  const double* const values = vector_of(outputs, variables, "outputs");
+  const double* const deviations = sigmas ? vector_of(*sigmas, variables, "sigmas") : nullptr;
   const Lock lock(self.mutex);
-  self.estimator->push_measurement(time, values);
+  self.estimator->push_measurement(time, values, deviations);
 }
 
 void push_input(NamedEstimator& self, double time, const Numbers& inputs) {
@@ -292,8 +294,9 @@ void bind_estimators(py::module_& module) {
       "Measurements and inputs may come in any order. Several threads may use it; each call waits for the others.")
       .def("__reduce_ex__", not_copied("make another one with make_estimator() of the robot, which can be pickled"))
       .def(py::init(&make_estimator), py::arg("robot").none(false), py::arg("initial_state") = py::none())
-      .def("push_measurement", &push_measurement, py::arg("time"), py::arg("outputs"),
-           "Measured y, (n_y), NaN where missing, at a time [s].")
+      .def("push_measurement", &push_measurement, py::arg("time"), py::arg("outputs"), py::arg("sigmas") = py::none(),
+           "Measured y, (n_y), NaN where missing, at a time [s]. `sigmas`, (n_y): standard deviations of this "
+           "measurement, e.g. as its receiver states them; those that are not above 0 are as always.")
       .def("push_input", &push_input, py::arg("time"), py::arg("inputs"),
            "Measured u, (n_u), NaN where missing, which holds from a time [s] on.")
       .def("estimate", &estimate, py::arg("time"), py::arg("deadline") = py::none(), py::kw_only(),

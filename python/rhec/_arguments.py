@@ -339,6 +339,7 @@ MEANINGS = {
     "obstacles": "rows of x [m], y [m], semi-axes along and across [m], heading [rad], velocity in x and y [m/s], (n, 7)",
     "out": "what an earlier call returned, or None",
     "outputs": "a number for each output, (n_y), in their units, NaN for what is missing",
+    "sigmas": "a standard deviation for each output, (n_y), in their units, NaN for those that are as usual",
     "parameters": "a number for each parameter, (n_p), or rows of them, (n, n_p)",
     "path": "a Path",
     "robot": "what is inside a Robot; call its make_estimator or make_controller",

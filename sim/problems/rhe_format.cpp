@@ -155,6 +155,32 @@ void read_between(const LineValue& list, ProblemRecord& record) {
   }
 }
 
+/// Of measurements that are known.
+void read_relative_weights(const LineValue& map, ProblemRecord& record) {
+  map.allow({"outputs", "between"});
+  const std::size_t width = record.outputs.front().size();
+  const auto check = [width](const LineValue& of, const ProblemRecord::Rows& rows) {
+    for (const std::vector<double>& row : rows) {
+      if (row.size() != width) throw of.error(fmt::format("rows of {}, expected {}: one an output", row.size(), width));
+      for (const double weight : row)
+        if (!(weight > 0.0)) throw of.error(fmt::format("found {}; expected weights above 0", weight));
+    }
+  };
+  record.relative_weights = map["outputs"].rows(record.outputs.size(), "one for each node of the horizon", false);
+  check(map["outputs"], record.relative_weights);
+  if (!map.has("between")) return;
+  const LineValue between = map["between"];
+  const std::vector<LineValue> intervals = between.items("a list of the weights of the intervals' measurements");
+  if (intervals.size() != record.between.size())
+    throw between.error(
+        fmt::format("{} items, expected {}: one for each item of `between`", intervals.size(), record.between.size()));
+  for (std::size_t i = 0; i < intervals.size(); ++i) {
+    record.relative_weights_between.push_back(
+        intervals[i].rows(record.between[i].size(), "one for each measurement of the interval", false));
+    check(intervals[i], record.relative_weights_between.back());
+  }
+}
+
 /// The vehicle with the process noise of its states, if the record has some.
 std::shared_ptr<const Model> with_state_noise(const ProblemRecord& record, std::shared_ptr<const Model> model) {
   if (record.state_noise.empty() && record.blocked_noise.empty()) return model;
@@ -279,7 +305,8 @@ void fill(const ProblemRecord& record, RheProblem& problem) {
     for (Eigen::Index c = 0; c < n; ++c) problem.arrival_information(r, c) = record.arrival_information[r][c];
   }
   for (int i = 0; i <= record.intervals; ++i)
-    std::copy(record.outputs[i].begin(), record.outputs[i].end(), problem.output(i));
+    problem.set_output(
+        i, {record.outputs[i].data(), record.relative_weights.empty() ? nullptr : record.relative_weights[i].data()});
   for (int i = 0; i < record.intervals; ++i) {
     problem.set_duration(i, record.durations[i]);
     std::copy(record.inputs[i].begin(), record.inputs[i].end(), problem.measured_input(i));
@@ -287,7 +314,11 @@ void fill(const ProblemRecord& record, RheProblem& problem) {
     problem.between(i).clear();
     for (std::size_t k = 0; !record.between.empty() && k < record.between[i].size(); ++k) {
       const std::vector<double>& row = record.between[i][k];
-      std::copy(row.begin() + 1, row.end(), problem.between(i).add(row.front()));
+      problem.between(i).add(row.front());
+      problem.between(i).add_outputs(
+          static_cast<int>(k),
+          {row.data() + 1,
+           record.relative_weights_between.empty() ? nullptr : record.relative_weights_between[i][k].data()});
     }
   }
   for (std::size_t j = 0; j < about.parameters.size(); ++j) {
@@ -322,6 +353,30 @@ bool fits(const RheProblem::Setup& wanted, const RheProblem::Setup& there) {
          wanted.parameter_lower == there.parameter_lower && wanted.parameter_upper == there.parameter_upper;
 }
 
+/// Where all are 1, none are kept.
+void keep_relative_weights(const RheProblem& problem, ProblemRecord& record) {
+  const std::size_t width = record.outputs.front().size();
+  bool is_any = false;
+  const auto weights_of = [&](Measured measured) {
+    std::vector<double> weights(width);
+    for (std::size_t j = 0; j < width; ++j) {
+      const auto output = static_cast<std::ptrdiff_t>(j);
+      weights[j] = std::isnan(measured[output]) ? 1.0 : measured.weight(output);
+      is_any = is_any || weights[j] != 1.0;
+    }
+    return weights;
+  };
+  for (int i = 0; i <= record.intervals; ++i) record.relative_weights.push_back(weights_of(problem.measured(i)));
+  for (std::size_t i = 0; i < record.between.size(); ++i) {
+    ProblemRecord::Rows& rows = record.relative_weights_between.emplace_back();
+    for (std::size_t k = 0; k < record.between[i].size(); ++k)
+      rows.push_back(weights_of(problem.between(static_cast<int>(i)).measured(static_cast<int>(k))));
+  }
+  if (is_any) return;
+  record.relative_weights.clear();
+  record.relative_weights_between.clear();
+}
+
 class RheFormat final : public ProblemFormat {
  public:
   RheFormat()
@@ -330,7 +385,8 @@ class RheFormat final : public ProblemFormat {
              .keys = {"version", "id", "problem", "model", "horizon", "arrival", "outputs", "inputs", "weights",
                       "bounds", "block_starts"},
              .added = {{2, {"robust", "neighbour_variance", "transition", "guess", "origin", "processes", "data"}},
-                       {4, {"state_noise", "blocked_noise", "block_weights", "between"}}},
+                       {4, {"state_noise", "blocked_noise", "block_weights", "between"}},
+                       {5, {"relative_weights"}}},
              .looks_back = true,
              .may_be_empty = true,
              .finds_parameters = true}) {}
@@ -351,6 +407,7 @@ class RheFormat final : public ProblemFormat {
     record.outputs = line["outputs"].rows(N + 1, "one for each node of the horizon", true);
     record.inputs = line["inputs"].rows(N, "one for each interval of the horizon", true);
     if (line.has("between")) read_between(line["between"], record);
+    if (line.has("relative_weights")) read_relative_weights(line["relative_weights"], record);
     weights.allow({"outputs", "inputs"});
     record.output_weights = read_weights(weights["outputs"]);
     record.input_weights = read_weights(weights["inputs"]);
@@ -378,6 +435,12 @@ class RheFormat final : public ProblemFormat {
       for (const ProblemRecord::Rows& rows : record.between) line["between"].push_back(rows_of(rows));
     }
     line["weights"] = {{"outputs", list_of(record.output_weights)}, {"inputs", list_of(record.input_weights)}};
+    if (!record.relative_weights.empty()) {
+      Json& weights = line["relative_weights"];
+      weights["outputs"] = rows_of(record.relative_weights);
+      for (const ProblemRecord::Rows& rows : record.relative_weights_between)
+        weights["between"].push_back(rows_of(rows));
+    }
     if (!record.robust.empty()) {
       line["robust"] = Json::array();
       for (const ProblemRecord::Robust& robust : record.robust)
@@ -422,6 +485,7 @@ class RheFormat final : public ProblemFormat {
     }
     if (std::ranges::all_of(record.between, [](const ProblemRecord::Rows& rows) { return rows.empty(); }))
       record.between.clear();
+    keep_relative_weights(problem, record);
     record.processes = process_counts(about);
     record.state_noise = state_names(about, about.noisy_states);
     record.blocked_noise = state_names(about, about.blocked_noises);

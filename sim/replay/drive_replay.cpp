@@ -195,7 +195,7 @@ class Driver {
     if (std::binary_search(withheld_.begin(), withheld_.end(), index))
       for (const int j : sensor().outputs) outputs_[static_cast<std::size_t>(j)] = missing;
     if (std::ranges::any_of(outputs_, [](double value) { return !std::isnan(value); }))
-      estimator_->push_measurement(event.time, outputs_.data());
+      estimator_->push_measurement(event.time, outputs_.data(), drive_.sigmas_of(event));
   }
 
   /// Predicts what is due before a time.

@@ -187,8 +187,11 @@ std::string drive_summary_json(const std::vector<DriveResult>& results, const st
   json["damage"] = drive.damage ? Json(drive.damage->what) : Json();
   Json& signals = json["signals"] = Json::object();
   for (const logs::SignalCount& each : drive.signals)
-    signals[(each.is_output ? "outputs." : "inputs.") + each.variable] = {
-        {"from", each.source}, {"values", each.values}, {"missing", each.missing}, {"left_out", each.left_out}};
+    signals[(each.is_output ? "outputs." : "inputs.") + each.variable] = {{"from", each.source},
+                                                                          {"values", each.values},
+                                                                          {"missing", each.missing},
+                                                                          {"left_out", each.left_out},
+                                                                          {"stated", each.stated}};
   json["hold_out"] = {{"every", hold_out.every}, {"phase", hold_out.phase}};
   json["variant"] = results.front().all.name;
   Json& variants = json["variants"];

@@ -40,7 +40,7 @@ class AskedMethod final : public EstimationMethod {
   int most_between() const noexcept override { return method_->most_between(); }
   int reach() const noexcept override { return method_->reach(); }
   int most_reach() const noexcept override { return method_->most_reach(); }
-  void start(const double* outputs) noexcept override {
+  void start(Measured outputs) noexcept override {
     times_.assign(1, 0.0);
     method_->start(outputs);
   }
@@ -48,25 +48,27 @@ class AskedMethod final : public EstimationMethod {
     method_->rewind(nodes);
     times_.resize(times_.size() - std::min(times_.size(), static_cast<std::size_t>(nodes)));
   }
-  void add(const MeasuredInterval& interval, const double* outputs) noexcept override {
+  void add(const MeasuredInterval& interval, Measured outputs) noexcept override {
     const double start = times_.back();
     if (interval.duration > 0.0) {
       between_.assign(interval.outputs,
                       interval.outputs + static_cast<std::size_t>(interval.between) * nothing_.size());
       for (int j = 0; j < interval.between; ++j) {
         double* const row = between_.data() + static_cast<std::size_t>(j) * nothing_.size();
-        method_->add({interval.times[j], interval.inputs, j, interval.times, between_.data()}, nothing_.data());
-        ask(start + interval.times[j], row);
+        method_->add({interval.times[j], interval.inputs, j, interval.times, between_.data(), interval.weights},
+                     nothing_.data());
+        ask(start + interval.times[j], row, interval.measured(j, std::ssize(nothing_)).weights);
         method_->rewind(1);
       }
-      method_->add({interval.duration, interval.inputs, interval.between, interval.times, between_.data()},
-                   nothing_.data());
+      method_->add(
+          {interval.duration, interval.inputs, interval.between, interval.times, between_.data(), interval.weights},
+          nothing_.data());
       times_.push_back(start + interval.duration);
     }
-    node_.assign(outputs, outputs + nothing_.size());
+    node_.assign(outputs.values, outputs.values + nothing_.size());
     if (std::ranges::all_of(node_, [](double value) { return std::isnan(value); })) return;
-    ask(times_.back(), node_.data());
-    method_->add_node(0.0, no_input_.data(), node_.data());
+    ask(times_.back(), node_.data(), outputs.weights);
+    method_->add_node(0.0, no_input_.data(), {node_.data(), outputs.weights});
   }
   void estimate(Estimate& result, Clock::time_point deadline) noexcept override { method_->estimate(result, deadline); }
   void reset() noexcept override {
@@ -76,7 +78,7 @@ class AskedMethod final : public EstimationMethod {
 
  private:
   /// Notes what the newest node expects of outputs at its time, and takes those away that are not to be used.
-  void ask(double time, double* outputs) {
+  void ask(double time, double* outputs, const double* weights) {
     method_->estimate(expected_, Clock::time_point::max());
     const Model& m = model();
     const Eigen::Index ny = m.output_count(), nx = m.state_count();
@@ -99,7 +101,7 @@ class AskedMethod final : public EstimationMethod {
         for (Eigen::Index b = 0; b < n; ++b)
           S(a, b) = H.row(measured[static_cast<std::size_t>(a)]) * P *
                     H.row(measured[static_cast<std::size_t>(b)]).transpose();
-        S(a, a) += variances_[j];
+        S(a, a) += variances_[j] / (weights ? weights[j] : 1.0);
       }
       const Eigen::LLT<Eigen::MatrixXd> factor(S);
       Innovation innovation{.size = static_cast<int>(n), .squared = squared_of_lost, .log_determinant = 0.0};

@@ -193,6 +193,8 @@ class TunedDrive final : public TunedLog {
       result.events.back().values = result.values.size();
       const std::size_t count = event.is_output ? offsets_.size() - inputs_ : inputs_;
       for (std::size_t j = 0; j < count; ++j) result.values.push_back(value_of(j));
+      if (const double* const sigmas = drive.sigmas_of(event))
+        result.values.insert(result.values.end(), sigmas, sigmas + count);
     };
     for (const logs::DriveEvent& event : drive.events) {
       const double* values = drive.values_of(event);

@@ -39,9 +39,9 @@ class InnovationMethod final : public EstimationMethod {
 
   const Model& model() const noexcept override { return method_->model(); }
   int substeps() const noexcept override { return method_->substeps(); }
-  void start(const double* outputs) noexcept override { method_->start(outputs); }
+  void start(Measured outputs) noexcept override { method_->start(outputs); }
   // Without measurements between nodes: each is asked for at a node.
-  void add(const MeasuredInterval& interval, const double* outputs) noexcept override {
+  void add(const MeasuredInterval& interval, Measured outputs) noexcept override {
     const bool is_fix = std::any_of(places_.begin(), places_.end(), [&](int j) { return !std::isnan(outputs[j]); });
     if (!is_fix) return method_->add(interval, outputs);
     if (interval.duration > 0.0) method_->add(interval, nothing_.data());
@@ -55,7 +55,7 @@ class InnovationMethod final : public EstimationMethod {
   }
 
  private:
-  void note(const double* outputs) noexcept {
+  void note(Measured outputs) noexcept {
     // Fixes come in their order; those that nobody pushed are passed over.
     const auto same = [](double a, double b) { return a == b || (std::isnan(a) && std::isnan(b)); };
     while (next_ < log_.fixes.size() &&
@@ -79,7 +79,7 @@ class InnovationMethod final : public EstimationMethod {
       error[a] = outputs[j] - predicted_[j];
       for (int b = 0; b < size; ++b)
         S(a, b) = H.row(j) * expected_.covariance.topLeftCorner(nx, nx) * H.row(places_[taken[b]]).transpose();
-      S(a, a) += variances_[taken[a]];
+      S(a, a) += variances_[taken[a]] / outputs.weight(j);
     }
     const double determinant = size == 2 ? S.determinant() : S(0, 0);
     innovation.size = size;

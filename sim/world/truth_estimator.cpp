@@ -13,8 +13,8 @@ class TruthEstimation final : public EstimationMethod {
       : model_(std::move(model)), substeps_(substeps), vehicle_(vehicle) {}
   const Model& model() const noexcept override { return *model_; }
   int substeps() const noexcept override { return substeps_; }
-  void start(const double*) noexcept override {}
-  void add(const MeasuredInterval&, const double*) noexcept override {}
+  void start(Measured) noexcept override {}
+  void add(const MeasuredInterval&, Measured) noexcept override {}
   void estimate(Estimate& result, Clock::time_point) noexcept override {
     result.state = vehicle_.state();
     result.parameters = vehicle_.parameters();

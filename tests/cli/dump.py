@@ -61,7 +61,7 @@ class Test(cli.Findings):
         self.expect(len(problems) == len(solutions) > 0, name, f"{len(problems)} problems, {len(solutions)} solutions")
         for problem, solution in zip(problems, solutions):
             origin = problem["origin"]
-            self.expect(problem["version"] == 4 and problem["id"] == solution["id"], name, f"{problem['id']}")
+            self.expect(problem["version"] == 5 and problem["id"] == solution["id"], name, f"{problem['id']}")
             self.expect(solution["objective"] == float(origin["objective"]) and solution["status"] == origin["status"]
                         and solution["iterations"] == int(origin["iterations"]), name,
                         f"{problem['id']} was {origin}, is {solution['objective']!r}, {solution['status']}")
@@ -147,7 +147,7 @@ class Test(cli.Findings):
         line = lines_of(good)[1]
         file = self.work / "bad.jsonl"
         for change, words in [
-                ({"version": 5}, ["version: found 5, expected 1 .. 4"]),
+                ({"version": 6}, ["version: found 6, expected 1 .. 5"]),
                 ({"version": 1}, ["is a key of version 2; add \"version\": 2"]),
                 ({"gues": {}}, ["gues: unknown key; did you mean 'guess'?"]),
                 ({"guess": {"states": line["guess"]["states"]}}, ["guess.controls: missing"]),

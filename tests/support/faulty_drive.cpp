@@ -100,6 +100,7 @@ Episode drive_with_fault(const Robot& robot, const Fault& fault, std::uint64_t s
     delivery.since = since;
     delivery.stamp = delivery.asked = time;
     delivery.has_outputs = delivery.has_inputs = true;
+    delivery.sigmas.assign(delivery.outputs.size(), std::nan(""));
     model.observe({.count = 1, .states = truth.state.data(), .outputs = delivery.outputs.data()});
     for (std::size_t j = 0; j < delivery.outputs.size(); ++j)
       delivery.outputs[j] += robot.output_sigmas()[j] * noise(random);
@@ -110,7 +111,8 @@ Episode drive_with_fault(const Robot& robot, const Fault& fault, std::uint64_t s
       delivery.inputs[j] += robot.input_sigmas()[j] * noise(random);
     delivery.outputs[0] += moved;
     if (is_on && fault.spoil) fault.spoil(delivery);
-    if (delivery.has_outputs) estimator->push_measurement(delivery.stamp, delivery.outputs.data());
+    if (delivery.has_outputs)
+      estimator->push_measurement(delivery.stamp, delivery.outputs.data(), delivery.sigmas.data());
     const bool is_hurried = fault.is_hurried && since >= 0;
     const Estimate& estimate =
         estimator->estimate(delivery.asked, is_hurried ? Clock::now() : Clock::time_point::max());

@@ -18,6 +18,7 @@ struct Delivery {
   double asked = 0.0;           ///< time of the question [s]
   std::vector<double> outputs;  ///< measured y
   std::vector<double> inputs;   ///< measured u of the interval that follows
+  std::vector<double> sigmas;   ///< that measurements state, NaN: none
   bool has_outputs = true, has_inputs = true;
 };
 

@@ -278,7 +278,8 @@ void Loop::use(const logs::SignalRow& row, bool triggers, Clock::time_point rece
 
 void Loop::push(const logs::SignalRow& row) {
   const double time = time_of(row.stamp);
-  if (row.is_output) return estimator_->push_measurement(time, row.values.data());
+  if (row.is_output)
+    return estimator_->push_measurement(time, row.values.data(), row.sigmas.empty() ? nullptr : row.sigmas.data());
   // Inputs may come in several messages: what another one has said holds on.
   for (std::size_t j = 0; j < inputs_.size(); ++j) {
     if (!std::isnan(row.values[j]) && time >= input_times_[j]) {

@@ -29,11 +29,11 @@ constexpr int room = 16;
 struct Row {
   double stamp = 0.0, arrival = 0.0;
   bool is_input = false;
-  std::vector<double> values;
+  std::vector<double> values, sigmas = {};  ///< of outputs; none: as usual
 };
 
-/// A drive of a linear model with an encoder at 20 Hz (the last output), positions at 5 Hz beside the grid, and inputs
-/// at 10 Hz.
+/// A drive of a linear model with an encoder at 20 Hz (the last output), positions at 5 Hz beside the grid, each as
+/// accurate as it says, and inputs at 10 Hz.
 std::vector<Row> stream(const Model& model, double seconds, unsigned seed) {
   std::mt19937 random(seed);
   std::normal_distribution<double> normal;
@@ -53,9 +53,12 @@ std::vector<Row> stream(const Model& model, double seconds, unsigned seed) {
     const bool encoder = k % 5 == 0, fix = k > 0 && k % 20 == 7;
     if (encoder || fix) {
       model.observe({.count = 1, .states = x.data(), .outputs = y.data()});
-      Row row{time, time, false, std::vector<double>(ny, nan)};
-      for (int j = 0; j < ny; ++j)
-        if ((j == ny - 1 && encoder) || (j < ny - 1 && fix)) row.values[j] = y[j] + noise.outputs[j] * normal(random);
+      Row row{time, time, false, std::vector<double>(ny, nan), std::vector<double>(ny, nan)};
+      for (int j = 0; j < ny; ++j) {
+        if (!((j == ny - 1 && encoder) || (j < ny - 1 && fix))) continue;
+        row.sigmas[j] = noise.outputs[j] * (random() % 3 == 0 ? 1.0 : std::exp(normal(random)));
+        row.values[j] = y[j] + row.sigmas[j] * normal(random);
+      }
       rows.push_back(row);
     }
     const double step = 0.01;
@@ -136,7 +139,7 @@ void drive(Estimator& estimator, std::vector<Row> rows, double until) {
     if (row.is_input)
       estimator.push_input(row.stamp, row.values.data());
     else
-      estimator.push_measurement(row.stamp, row.values.data());
+      estimator.push_measurement(row.stamp, row.values.data(), row.sigmas.empty() ? nullptr : row.sigmas.data());
   }
   estimator.estimate(until);
 }
@@ -158,7 +161,7 @@ class DenseFilter {
   DenseFilter(const std::shared_ptr<const Model>& model, const FilterEstimation::Setup& setup)
       : model_(model), setup_(setup), mean(setup.initial_mean), covariance(setup.initial_covariance) {}
 
-  void update(const std::vector<double>& y) {
+  void update(Measured y) {
     const Step here = at(mean.head(nx()), Eigen::VectorXd::Zero(nu()), mean.tail(np()), 0.0);
     std::vector<Eigen::VectorXd> rows;
     std::vector<double> innovations, variances;
@@ -177,8 +180,7 @@ class DenseFilter {
     std::vector<double> innovations, variances;
     for (int k = 0; k < between.count(); ++k) {
       const Step there = at(z.head(nx()), z.tail(nu()), z.segment(nx(), np()), between.time(k));
-      const std::vector<double> y(between.outputs(k), between.outputs(k) + model_->output_count());
-      collect(there, y, there.jacobian, rows, innovations, variances);
+      collect(there, between.measured(k), there.jacobian, rows, innovations, variances);
     }
     condition(z, P, rows, innovations, variances);
     const Step end = at(z.head(nx()), z.tail(nu()), z.segment(nx(), np()), duration);
@@ -211,9 +213,8 @@ class DenseFilter {
     step.jacobian << J.leftCols(nx()), J.rightCols(np()), J.middleCols(nx(), nu());
     return step;
   }
-  void collect(const Step& step, const std::vector<double>& y, const Eigen::MatrixXd& transition,
-               std::vector<Eigen::VectorXd>& rows, std::vector<double>& innovations,
-               std::vector<double>& variances) const {
+  void collect(const Step& step, Measured y, const Eigen::MatrixXd& transition, std::vector<Eigen::VectorXd>& rows,
+               std::vector<double>& innovations, std::vector<double>& variances) const {
     Eigen::VectorXd h(model_->output_count());
     Eigen::MatrixXd C(model_->output_count(), nx());
     model_->observe({.count = 1, .states = step.state.data(), .outputs = h.data(), .jacobians = C.data()});
@@ -221,7 +222,7 @@ class DenseFilter {
       if (std::isnan(y[j])) continue;
       rows.emplace_back((C.row(j) * transition).transpose());
       innovations.push_back(y[j] - h[j]);
-      variances.push_back(setup_.noise.output_variances[j]);
+      variances.push_back(setup_.noise.output_variances[j] / y.weight(j));
     }
   }
   static void condition(Eigen::VectorXd& z, Eigen::MatrixXd& P, const std::vector<Eigen::VectorXd>& rows,
@@ -246,10 +247,11 @@ class DenseFilter {
 
 /// A run of intervals with measurements between their nodes.
 struct Course {
-  std::vector<double> outputs;
+  MeasuredOutputs outputs;
   struct Interval {
     double duration;
-    std::vector<double> inputs, outputs;
+    std::vector<double> inputs;
+    MeasuredOutputs outputs;
     BetweenNodes between;
   };
   std::vector<Interval> intervals;
@@ -263,14 +265,24 @@ Course course_of(const Model& model, int count, unsigned seed) {
     for (double& value : values) value = std::abs(normal(random)) < missing ? nan : normal(random);
     return values;
   };
-  Course run{draw(model.output_count(), 0.3), {}};
+  // Some say how accurate they are.
+  const auto measure = [&](double missing) {
+    const std::vector<double> y = draw(model.output_count(), missing);
+    std::vector<double> weights(y.size(), 1.0);
+    for (double& weight : weights)
+      if (random() % 2 == 0) weight = std::exp(normal(random));
+    MeasuredOutputs measured(model.output_count());
+    measured.assign({y.data(), random() % 2 == 0 ? weights.data() : nullptr});
+    return measured;
+  };
+  Course run{measure(0.3), {}};
   for (int i = 0; i < count; ++i) {
-    Course::Interval interval{0.2 + 0.05 * (i % 3), draw(model.input_count(), 0.0), draw(model.output_count(), 0.8),
+    Course::Interval interval{0.2 + 0.05 * (i % 3), draw(model.input_count(), 0.0), measure(0.8),
                               BetweenNodes(model.output_count(), room)};
     const int between = static_cast<int>(random() % 6);
     for (int k = 0; k < between; ++k) {
-      const std::vector<double> y = draw(model.output_count(), 0.6);
-      std::copy(y.begin(), y.end(), interval.between.add(interval.duration * (k + 0.7) / (between + 0.7)));
+      interval.between.add(interval.duration * (k + 0.7) / (between + 0.7));
+      interval.between.add_outputs(k, measure(0.6).measured());
     }
     run.intervals.push_back(interval);
   }
@@ -283,13 +295,13 @@ TEST(BetweenNodes, AFilterConditionsTheWholeIntervalOnThem) {
   FilterEstimation filter(model, setup);
   DenseFilter dense(model, setup);
   const Course run = course_of(*model, 30, 3);
-  filter.start(run.outputs.data());
-  dense.update(run.outputs);
+  filter.start(run.outputs.measured());
+  dense.update(run.outputs.measured());
   Estimate own = empty_estimate(*model), expected = own;
   for (const Course::Interval& interval : run.intervals) {
-    filter.add(interval.between.over(interval.duration, interval.inputs.data()), interval.outputs.data());
+    filter.add(interval.between.over(interval.duration, interval.inputs.data()), interval.outputs.measured());
     dense.predict(interval.duration, interval.inputs, interval.between);
-    dense.update(interval.outputs);
+    dense.update(interval.outputs.measured());
     filter.estimate(own, Clock::time_point::max());
     expected.state = dense.mean.head(4);
     expected.parameters = dense.mean.tail(2);
@@ -306,12 +318,12 @@ TEST(BetweenNodes, AWindowIsTheFilterOfItsPrior) {
       const auto window = window_of_priors(model, intervals, {member});
       BankEstimation bank(model, bank_estimation_setup(*model, {member}));
       const Course run = course_of(*model, 25, 5);
-      window->start(run.outputs.data());
-      bank.start(run.outputs.data());
+      window->start(run.outputs.measured());
+      bank.start(run.outputs.measured());
       Estimate own = empty_estimate(*model), expected = own;
       for (const Course::Interval& interval : run.intervals) {
         for (EstimationMethod* each : {window.get(), static_cast<EstimationMethod*>(&bank)})
-          each->add(interval.between.over(interval.duration, interval.inputs.data()), interval.outputs.data());
+          each->add(interval.between.over(interval.duration, interval.inputs.data()), interval.outputs.measured());
         window->estimate(own, Clock::time_point::max());
         bank.estimate(expected, Clock::time_point::max());
         ASSERT_FALSE(own.fallback);
@@ -332,14 +344,14 @@ TEST(BetweenNodes, AWindowOfBlocksIsTheFilter) {
       const auto window = walks ? window_of_blocks(model, arrival, "unblocked", "{neighbour_sigma: 0.2}")
                                 : window_of_blocks(model, arrival, "full_horizon", "{}");
       const Course run = course_of(*model, 25, 5);
-      window->start(run.outputs.data());
-      filter.start(run.outputs.data());
+      window->start(run.outputs.measured());
+      filter.start(run.outputs.measured());
       Estimate own = empty_estimate(*model), expected = own;
       int k = 0;
       for (const Course::Interval& interval : run.intervals) {
         // A filter's walk comes behind an interval, that of blocks before it: the first interval has none.
         for (EstimationMethod* each : {window.get(), static_cast<EstimationMethod*>(&filter)})
-          each->add(interval.between.over(interval.duration, interval.inputs.data()), interval.outputs.data());
+          each->add(interval.between.over(interval.duration, interval.inputs.data()), interval.outputs.measured());
         window->estimate(own, Clock::time_point::max());
         window->prepare();
         filter.estimate(expected, Clock::time_point::max());
@@ -368,7 +380,9 @@ void expect_same(const std::vector<Way>& ways, const std::vector<Row>& in_time, 
     if (random() % 3 == 0) row.arrival = std::min(row.stamp + delay(random), until);
   for (const Way& way : ways) {
     SCOPED_TRACE(way.name);
-    Estimator one(way.make(), {.longest_interval = 0.2}), other(way.make(), {.longest_interval = 0.2});
+    std::unique_ptr<EstimationMethod> method = way.make();
+    const Estimator::Timeline timeline{.longest_interval = 0.2, .output_sigmas = noise_of(method->model()).outputs};
+    Estimator one(std::move(method), timeline), other(way.make(), timeline);
     drive(one, in_time, until);
     drive(other, late, until);
     EXPECT_GT(other.counts().late, 20);

@@ -19,6 +19,7 @@ using namespace rhec::testing;
 using ::testing::DoubleEq;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::IsEmpty;
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
@@ -28,18 +29,21 @@ class Recorder final : public EstimationMethod {
   struct Node {
     double duration;
     std::vector<double> inputs, outputs;
-    std::vector<double> times = {}, between = {};
+    std::vector<double> times = {}, between = {}, weights = {};
   };
   explicit Recorder(int room, int window) : room_(room), window_(window) {}
   const Model& model() const noexcept override { return *model_; }
   int substeps() const noexcept override { return 1; }
-  void start(const double* outputs) noexcept override { nodes = {{0.0, {}, {outputs, outputs + 2}}}; }
-  void add(const MeasuredInterval& interval, const double* outputs) noexcept override {
+  void start(Measured outputs) noexcept override {
+    nodes = {{0.0, {}, {outputs.values, outputs.values + 2}, {}, {}, weights_of(outputs)}};
+  }
+  void add(const MeasuredInterval& interval, Measured outputs) noexcept override {
     nodes.push_back({interval.duration,
                      {interval.inputs, interval.inputs + 1},
-                     {outputs, outputs + 2},
+                     {outputs.values, outputs.values + 2},
                      {interval.times, interval.times + interval.between},
-                     {interval.outputs, interval.outputs + 2 * interval.between}});
+                     {interval.outputs, interval.outputs + 2 * interval.between},
+                     weights_of(outputs)});
   }
   int most_between() const noexcept override { return room_; }
   int reach() const noexcept override { return std::min(static_cast<int>(nodes.size()), most_reach()); }
@@ -56,6 +60,10 @@ class Recorder final : public EstimationMethod {
   int estimates = 0;
 
  private:
+  static std::vector<double> weights_of(Measured outputs) {
+    return outputs.weights ? std::vector<double>(outputs.weights, outputs.weights + 2) : std::vector<double>();
+  }
+
   std::shared_ptr<const Model> model_ = linear_model<Trolley>();
   int room_, window_;
 };
@@ -336,6 +344,27 @@ TEST_F(Timeline, WhatIsNoNumberIsMaskedAndCounted) {
   EXPECT_EQ(estimator.counts().missing, 4);
   EXPECT_TRUE(std::isnan(recorder->nodes[1].inputs[0]));
   EXPECT_NEAR(recorder->nodes[2].inputs[0], 5.0, 1e-12);
+}
+
+TEST_F(Timeline, StatedDeviationsAreWeights) {
+  const double y[] = {1.0, 2.0}, sigmas[] = {0.2, nan}, none[] = {0.0, -1.0}, tiny[] = {1e-9, 4.0},
+               unknown[] = {infinity, 1.0};
+  Estimator weighing(std::make_unique<Recorder>(4, 8), {.longest_interval = 0.2, .output_sigmas = {0.1, 2.0}});
+  const std::vector<Recorder::Node>& nodes = dynamic_cast<const Recorder&>(weighing.method()).nodes;
+  int k = 0;
+  for (const double* each : {sigmas, none, tiny, unknown}) {
+    weighing.push_measurement(0.2 * k, y, each);
+    weighing.estimate(0.2 * k++);
+  }
+  ASSERT_EQ(nodes.size(), 4u);
+  EXPECT_THAT(nodes[0].weights, ElementsAre(DoubleEq(0.25), 1.0));
+  EXPECT_THAT(nodes[1].weights, IsEmpty()) << "what is not above 0 is no deviation";
+  EXPECT_THAT(nodes[2].weights, ElementsAre(DoubleEq(1e4), DoubleEq(0.25)));
+  EXPECT_TRUE(std::isnan(nodes[3].outputs[0])) << "nothing is known";
+  EXPECT_EQ(nodes[3].outputs[1], 2.0);
+  EXPECT_EQ(weighing.counts().missing, 1);
+  EXPECT_THROW(Estimator(std::make_unique<Recorder>(4, 8), {.output_sigmas = {0.1}}), Error);
+  EXPECT_THROW(Estimator(std::make_unique<Recorder>(4, 8), {.output_sigmas = {0.1, 0.0}}), Error);
 }
 
 TEST_F(Timeline, StampsThatAreNoTimesAreDropped) {

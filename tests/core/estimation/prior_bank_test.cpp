@@ -365,7 +365,8 @@ TEST(PriorBank, WeighsItsMembersByAnyNumberOfOutputs) {
 }
 
 /// With outputs of motion, at nodes and between them, few or many, a member is linearised where the Kalman filter is,
-/// and has its second-order terms; with a scale error beside them too.
+/// and has its second-order terms; with a scale error beside them too, and if some readings are less accurate than
+/// others.
 TEST(PriorBank, IsTheKalmanFilterWithOutputsOfMotion) {
   constexpr double sigma = 0.05, nan = std::numeric_limits<double>::quiet_NaN();
   constexpr int most = 12;
@@ -401,24 +402,32 @@ TEST(PriorBank, IsTheKalmanFilterWithOutputsOfMotion) {
       const double outputs[] = {0.3 * k * duration,
                                 k % 5 == 0 ? nan : 0.2 * std::sin(0.1 * k) + 0.01 * std::sin(9.0 * k)};
       const int readings = k % 3 == 0 ? 2 : k % 3 == 1 ? most : 0;
-      double times[most], between[2 * most];
+      double times[most], between[2 * most], weights[2 * most];
       for (int i = 0; i < readings; ++i) {
         times[i] = duration * (i + 0.3) / readings;
         between[2 * i] = i == 1 ? 0.3 * k * duration : nan;
         between[2 * i + 1] =
             readings == 2 && i == 1 ? nan : 0.2 * std::sin(0.1 * k - 0.05) + 0.01 * std::sin(7.0 * i + k);
+        weights[2 * i] = 1.0 + 0.5 * std::sin(i);
+        weights[2 * i + 1] = std::exp(std::sin(3.0 * i));
       }
-      const MeasuredInterval interval{
-          .duration = duration, .inputs = &omega, .between = readings, .times = times, .outputs = between};
-      bank.predict(interval, outputs);
-      filter.predict(interval, &zero, &ramp, nullptr, outputs);
+      const double weights_of_end[] = {0.4, 2.5};
+      const Measured end{outputs, k % 2 == 0 ? weights_of_end : nullptr};
+      const MeasuredInterval interval{.duration = duration,
+                                      .inputs = &omega,
+                                      .between = readings,
+                                      .times = times,
+                                      .outputs = between,
+                                      .weights = k % 4 > 1 ? weights : nullptr};
+      bank.predict(interval, end);
+      filter.predict(interval, &zero, &ramp, nullptr, end);
       if (k % 7 == 0) {  // what was expected of an end goes with it
         const double nothing[] = {nan, nan};
         bank.predict(interval, nothing);
         filter.predict(interval, &zero, &ramp, nullptr, nothing);
       }
-      bank.update(outputs);
-      filter.update(outputs, nullptr);
+      bank.update(end);
+      filter.update(end);
       bank.moments(mean, covariance);
       ASSERT_LT(largest(mean - filter.mean), 1e-9) << k;
       ASSERT_LT(largest(covariance - filter.covariance), 1e-9 * (1.0 + largest(covariance))) << k;

@@ -5,6 +5,7 @@
 #include <Eigen/Dense>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <random>
 #include <vector>
 
@@ -15,13 +16,14 @@ constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
 /// The measurements of one output, one row each.
 struct Readings {
-  std::vector<double> times, outputs;
+  std::vector<double> times, outputs, weights = {};
   double duration = 0.2;
   MeasuredInterval interval() const {
     return {.duration = duration,
             .between = static_cast<int>(times.size()),
             .times = times.data(),
-            .outputs = outputs.data()};
+            .outputs = outputs.data(),
+            .weights = weights.empty() ? nullptr : weights.data()};
   }
 };
 
@@ -51,8 +53,14 @@ Eigen::MatrixXd information(const MeasuredInterval& interval, int width, int out
 
 TEST(ReadingSummary, SaysOfAPolynomialWhatAllReadingsSay) {
   std::mt19937_64 random(3);
-  for (const int count : {5, 6, 20, 200}) {
-    const Readings readings = random_readings(count, 1, random);
+  for (const int count : {5, 6, 20, 200, -20}) {
+    Readings readings = random_readings(std::abs(count), 1, random);
+    double total = std::abs(count);
+    if (count < 0) {  // as accurate as each says
+      std::uniform_real_distribution<double> uniform(0.1, 4.0);
+      for (std::size_t k = 0; k < readings.times.size(); ++k) readings.weights.push_back(uniform(random));
+      total = std::accumulate(readings.weights.begin(), readings.weights.end(), 0.0);
+    }
     ReadingSummary summary({0}, 1, 200, 1);
     const MeasuredInterval few = summary(readings.interval());
     ASSERT_EQ(few.between, ReadingSummary::nodes) << count;
@@ -63,10 +71,10 @@ TEST(ReadingSummary, SaysOfAPolynomialWhatAllReadingsSay) {
       EXPECT_GT(few.times[k], k == 0 ? readings.times.front() : few.times[k - 1]);
       EXPECT_LT(few.times[k], readings.times.back());
     }
-    EXPECT_NEAR(weights, count, 1e-9 * count);
-    const Eigen::MatrixXd all = information(readings.interval(), 1, 0, nullptr),
+    EXPECT_NEAR(weights, total, 1e-9 * total);
+    const Eigen::MatrixXd all = information(readings.interval(), 1, 0, readings.interval().weights),
                           left = information(few, 1, 0, summary.weights());
-    EXPECT_LT((all - left).cwiseAbs().maxCoeff(), 1e-9 * count) << count;
+    EXPECT_LT((all - left).cwiseAbs().maxCoeff(), 1e-9 * total) << count;
   }
 }
 

@@ -31,6 +31,29 @@ TEST_P(SensorFaults, NoFaultNoFinding) {
   });
 }
 
+/// Fixes that say how poor they are, e.g. below trees, are no fault, and are used for what they are; those that claim
+/// to be better than they are, are one.
+TEST_P(SensorFaults, MeasurementsAreJudgedByTheAccuracyThatTheyState) {
+  const auto off_by = [](double error, double stated) {
+    return [=](Delivery& d) {
+      for (int j : {0, 1}) {
+        d.outputs[j] += (d.since + j) % 2 == 0 ? error : -error;
+        d.sigmas[j] = stated;
+      }
+    };
+  };
+  expect_each({.spoil = off_by(2.0, 2.0), .length = 15}, [](const Episode& episode) {
+    EXPECT_EQ(episode.counts.rejected, 0);
+    EXPECT_LT(episode.largest_error_during(), 2.5);  // by the speed alone, on ground that changes
+    for (const Episode::Sample& sample : episode.during) EXPECT_TRUE(sample.inside) << sample.error;
+    EXPECT_LE(episode.samples_to_recover(usual_error), 5);
+  });
+  expect_each({.spoil = off_by(2.0, 0.1), .length = 15}, [](const Episode& episode) {
+    EXPECT_GT(episode.counts.rejected, 10);
+    EXPECT_THAT(episode.during[0].words, HasSubstr("x_gps and y_gps rejected"));
+  });
+}
+
 TEST_P(SensorFaults, AValueThatIsStuckIsFound) {
   double held = 0.0;
   expect_each({.spoil =

@@ -19,8 +19,8 @@ using namespace testing;
 constexpr double missing = std::numeric_limits<double>::quiet_NaN();
 
 /// A problem on the cart: an interval with few measurements, to which each is integrated, two with many, whose states
-/// are interpolated, and one without.
-std::unique_ptr<RheProblem> problem_of(RandomProblem::RheSpec spec) {
+/// are interpolated, and one without. With `weighed`, measurements have weights of their own, at nodes, too.
+std::unique_ptr<RheProblem> problem_of(RandomProblem::RheSpec spec, bool weighed = false) {
   spec.intervals = 4;
   spec.adjust = [](RheProblem::Setup& setup, const RandomProblem::Drive&) { setup.most_between = 40; };
   RandomProblem random(cart(), 7);
@@ -30,7 +30,13 @@ std::unique_ptr<RheProblem> problem_of(RandomProblem::RheSpec spec) {
     for (int k = 0; k < count; ++k) {
       double* const y = problem->between(i).add(problem->duration(i) * (k + 0.5) / count);
       for (int j = 0; j < 2; ++j) y[j] = (j + k) % 3 ? random.normal() : missing;
+      const double values[] = {y[0], y[1]}, weights[] = {0.5 + 0.1 * k, k % 4 ? 1.0 : 3.0};
+      if (weighed) problem->between(i).add_outputs(k, {values, weights});
     }
+  }
+  for (int i = 0; weighed && i <= 4; ++i) {
+    const double values[] = {random.normal(), random.normal()}, weights[] = {0.3 + i, 2.0 / (1.0 + i)};
+    problem->set_output(i, {values, weights});
   }
   return problem;
 }
@@ -44,13 +50,24 @@ std::vector<RandomProblem::RheSpec> specs() {
   return all;
 }
 
+/// Problems of all kinds.
+template <class Use>
+void for_each_problem(const Use& use) {
+  for (const RandomProblem::RheSpec& spec : specs())
+    for (const bool weighed : {false, true}) use(spec, problem_of(spec, weighed));
+}
+
 double cost_of(const RheProblem& problem, const Iterate& point) {
   std::vector<double> scratch(problem.scratch_size());
   return problem.evaluate(point, nullptr, scratch);
 }
 
-TEST(RheBetween, CostsTheResidualAtItsTime) {
-  const auto problem = problem_of(specs()[1]);
+class OfMeasurements : public ::testing::TestWithParam<bool> {};
+INSTANTIATE_TEST_SUITE_P(RheBetween, OfMeasurements, ::testing::Bool(),
+                         [](const auto& each) { return each.param ? "Weighed" : "Alike"; });
+
+TEST_P(OfMeasurements, CostsTheResidualAtItsTime) {
+  const auto problem = problem_of(specs()[1], GetParam());
   const Iterate point = scattered_point(*problem);
   double expected = 0.0;
   for (int i = 0; i < 4; ++i) {
@@ -68,7 +85,8 @@ TEST(RheBetween, CostsTheResidualAtItsTime) {
       problem->model().observe({.count = 1, .states = x, .outputs = y});
       for (int j = 0; j < 2; ++j) {
         const double measured = problem->between(i).outputs(k)[j];
-        if (!std::isnan(measured)) expected += problem->setup().output_weights[j] * std::pow(y[j] - measured, 2);
+        const double weight = problem->setup().output_weights[j] * problem->between(i).measured(k).weight(j);
+        if (!std::isnan(measured)) expected += weight * std::pow(y[j] - measured, 2);
       }
     }
   }
@@ -93,8 +111,7 @@ void for_each_variable(const RheProblem& problem, Iterate& point, const Use& use
 }
 
 TEST(RheBetween, HasExactDerivatives) {
-  for (const RandomProblem::RheSpec& spec : specs()) {
-    const auto problem = problem_of(spec);
+  for_each_problem([](const RandomProblem::RheSpec&, const std::unique_ptr<RheProblem>& problem) {
     Iterate point = scattered_point(*problem);
     point.clear_multipliers();  // so that the exact Hessian is that of the cost
     std::vector<double> scratch(problem->scratch_size());
@@ -118,13 +135,12 @@ TEST(RheBetween, HasExactDerivatives) {
             << stage << ", " << variable << ", " << other;
       }
     });
-  }
+  });
 }
 
 /// Where residuals vanish, Gauss-Newton's Hessian is the exact one.
 TEST(RheBetween, GaussNewtonIsExactWithoutResiduals) {
-  for (const RandomProblem::RheSpec& spec : specs()) {
-    const auto problem = problem_of(spec);
+  for_each_problem([](const RandomProblem::RheSpec& spec, const std::unique_ptr<RheProblem>& problem) {
     Iterate point = scattered_point(*problem);
     point.clear_multipliers();
     std::vector<double> scratch(problem->scratch_size()), weights(40 * 2), rows(40 * 2 * 8);
@@ -155,12 +171,12 @@ TEST(RheBetween, GaussNewtonIsExactWithoutResiduals) {
                       1e-7 * (1.0 + std::abs(exact.H(i)[c * own.stride() + c])))
               << i << ", ramp " << problem->structure().any_ramp() << ", robust " << spec.robust;
     }
-  }
+  });
 }
 
 /// A solver's linearisation, which keeps what it knows as the horizon moves on, and a problem's own.
-TEST(RheBetween, ALinearisationFollowsThemAsTheHorizonMoves) {
-  const auto problem = problem_of(specs()[0]);
+TEST_P(OfMeasurements, ALinearisationFollowsThemAsTheHorizonMoves) {
+  const auto problem = problem_of(specs()[0], GetParam());
   Iterate point = scattered_point(*problem);
   std::vector<double> scratch(problem->scratch_size());
   const auto linearisation = problem->make_linearisation();
@@ -210,6 +226,36 @@ TEST(RheBetween, ALinearisationKnowsOutputsThatComeLater) {
   for (int i = 0; i < 4; ++i)
     for (int c = 0; c < problem->capacity().states; ++c)
       ASSERT_NEAR(linearisation->qp().h(i)[c], fresh.h(i)[c], 1e-9 * (1.0 + std::abs(fresh.h(i)[c]))) << i;
+}
+
+/// Weights that come and go, with outputs and times that stay.
+TEST(RheBetween, ALinearisationFollowsTheirWeights) {
+  const auto problem = problem_of(specs()[0]), weighed = problem_of(specs()[0], true);
+  const Iterate point = scattered_point(*problem);
+  std::vector<double> scratch(problem->scratch_size());
+  const auto linearisation = problem->make_linearisation();
+  StageQp fresh(problem->capacity());
+  std::vector<BetweenNodes> plain;
+  for (int i = 0; i < 4; ++i) plain.push_back(problem->between(i));
+  for (int round = 0; round < 5; ++round) {
+    for (int i = 0; i < 4; ++i) problem->between(i).assign(round % 2 ? weighed->between(i) : plain[i]);
+    for (int k = 0; k < problem->between(3).count(); ++k) {
+      const double weights[] = {1.0 + k, 0.25};
+      if (round == 3) problem->between(3).add_outputs(k, {plain[3].outputs(k), weights});
+    }
+    linearisation->prepare(point, Hessian::gauss_newton);
+    linearisation->refresh(point);
+    problem->linearise(all_stages(*problem), point, Hessian::gauss_newton, fresh, scratch);
+    for (int i = 0; i < 4; ++i) {
+      for (int c = 0; c < problem->capacity().states; ++c) {
+        ASSERT_NEAR(linearisation->qp().h(i)[c], fresh.h(i)[c], 1e-9 * (1.0 + std::abs(fresh.h(i)[c]))) << round;
+        for (int r = 0; r < problem->capacity().states; ++r)
+          ASSERT_NEAR(linearisation->qp().H(i)[c * fresh.stride() + r], fresh.H(i)[c * fresh.stride() + r],
+                      1e-9 * (1.0 + std::abs(fresh.H(i)[c * fresh.stride() + r])))
+              << "round " << round << ", stage " << i;
+      }
+    }
+  }
 }
 
 }  // namespace rhe_between_test

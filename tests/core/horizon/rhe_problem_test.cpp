@@ -27,7 +27,8 @@ std::array<double, 2> residuals(const RheProblem& problem, const Iterate& point,
   std::array<double, 2> found{};
   for (int j = 0; j < 2; ++j)
     if (!std::isnan(problem.output(node)[j]))
-      found[j] = problem.setup().output_weights[j] * std::pow(predicted[j] - problem.output(node)[j], 2);
+      found[j] = problem.setup().output_weights[j] * problem.measured(node).weight(j) *
+                 std::pow(predicted[j] - problem.output(node)[j], 2);
   return found;
 }
 
@@ -66,6 +67,41 @@ TEST(RheProblem, LeavesOutWhatIsMissing) {
   problem->measured_input(3)[0] = missing;
   const Iterate point = scattered_point(*problem);
   EXPECT_NEAR(cost_of(*problem, point), estimation_cost(*problem, point), 1e-12);
+}
+
+TEST(RheProblem, WeighsEachMeasurementByItsOwnAccuracy) {
+  for (const bool robust : {false, true}) {
+    RheProblem::Setup setup;
+    if (robust) setup.robust = {{.outputs = {0, 1}, .delta = 1.5}};
+    const auto problem = cart_estimation(5, setup);
+    const Iterate point = scattered_point(*problem);
+    const auto expected = [&] {
+      if (!robust) return estimation_cost(*problem, point);
+      double total = estimation_cost(*problem, point);
+      for (int i = 0; i <= 5; ++i) {
+        const auto each = residuals(*problem, point, i);
+        total += pseudo_huber(each[0] + each[1], 1.5) - each[0] - each[1];
+      }
+      return total;
+    };
+    const double before = cost_of(*problem, point), values[] = {0.7, 1.9}, weights[] = {3.0, 0.2};
+    problem->set_output(2, {values, weights});
+    EXPECT_EQ(problem->measured(2).weight(0), 3.0);
+    EXPECT_EQ(problem->measured(3).weight(0), 1.0);
+    EXPECT_NEAR(cost_of(*problem, point), expected(), 1e-12);
+    EXPECT_NE(cost_of(*problem, point), before);
+    problem->set_output_weight(0, 7.0);
+    EXPECT_NEAR(cost_of(*problem, point), expected(), 1e-12) << "they are relative to the output's weight";
+    problem->drop_first_interval();
+    EXPECT_EQ(problem->measured(1).weight(0), 3.0);
+    EXPECT_NEAR(cost_of(*problem, point), expected(), 1e-12);
+    const auto other = cart_estimation(5, setup);
+    other->take_data(*problem);
+    EXPECT_EQ(cost_of(*other, point), cost_of(*problem, point));
+    problem->set_output(1, values);
+    EXPECT_EQ(problem->measured(1).weight(0), 1.0) << "one without is as usual again";
+    EXPECT_NEAR(cost_of(*problem, point), expected(), 1e-12);
+  }
 }
 
 TEST(RheProblem, LinksBlocksByTheirVariance) {

@@ -27,6 +27,8 @@ struct RandomCosts {
   std::vector<int> control_counts;
   AlignedDoubles H, h, values, references, weights, turns, inverse_turns, y, predicted, jacobians;
   AlignedDoubles u, input_weights;
+  AlignedDoubles node_weights;       ///< rows of outputs
+  bool has_node_weights;             ///< else all nodes have `weights`
   std::vector<double> room, pulls;   ///< of the latter none: H holds nothing yet
   std::vector<unsigned char> clean;  ///< empty: of no stage
 
@@ -55,6 +57,9 @@ struct RandomCosts {
       weights[k] = k % 3 == 2 ? 0.0 : random.uniform(0.1, 2.0);
       if (k % 4 == 1) turns[k] = 6.25, inverse_turns[k] = 1.0 / 6.25;
     }
+    has_node_weights = random.integer(0, 1) == 1;
+    node_weights = rows(nodes, seen);
+    for (double& weight : node_weights) weight = std::abs(weight);
     y = rows(nodes, seen);
     for (std::size_t k = 0; k < y.size(); ++k)
       if (static_cast<int>(k % seen) >= outputs || random.integer(0, 5) == 0) y[k] = std::nan("");
@@ -71,6 +76,9 @@ struct RandomCosts {
     }
     room.assign(2 * seen, 0.0);
   }
+  double weight(int node, int output) const {
+    return has_node_weights ? node_weights[node * padded(outputs) + output] : weights[output];
+  }
   CostView view(bool matrices, bool vectors, bool bends) {
     return {N,
             states,
@@ -84,7 +92,8 @@ struct RandomCosts {
   double measure(const TranscriptionKernels& kernels, bool matrices, bool vectors) {
     return kernels.write_measurements(
         view(matrices, vectors, false),
-        {vehicle_states, outputs, inputs, y.data(), u.data(), predicted.data(), jacobians.data(), weights.data(),
+        {vehicle_states, outputs, inputs, y.data(), u.data(), predicted.data(), jacobians.data(),
+         has_node_weights ? node_weights.data() : weights.data(), has_node_weights ? padded(outputs) : 0,
          input_weights.data(), turns.data(), inverse_turns.data(), values.data(), room.data(),
          pulls.empty() ? nullptr : pulls.data(), clean.empty() ? nullptr : clean.data()},
         0, N);
@@ -148,10 +157,10 @@ TEST(TranscriptionKernels, OfMeasurementsAreTheSumOfSquares) {
         if (std::isnan(y)) continue;
         double error = costs.predicted[i * seen + j] - y;
         if (costs.turns[j] > 0.0) error = std::remainder(error, costs.turns[j]);
-        expected += costs.weights[j] * error * error;
+        expected += costs.weight(i, j) * error * error;
         for (int c = 0; c < costs.vehicle_states; ++c)
           gradient[i * costs.stride + c] +=
-              2.0 * costs.weights[j] * error * costs.jacobians[(i * costs.outputs + j) * wide + c];
+              2.0 * costs.weight(i, j) * error * costs.jacobians[(i * costs.outputs + j) * wide + c];
       }
       for (int j = 0; i < costs.N && j < costs.inputs; ++j) {
         const int at = i * costs.stride + costs.states + j;
@@ -196,7 +205,7 @@ TEST(TranscriptionKernels, SquaresOfMeasurementsAreAddedToWhatBends) {
           const double y = start.y[i * seen + j];
           double error = std::isnan(y) ? 0.0 : start.predicted[i * seen + j] - y;
           if (start.turns[j] > 0.0) error = std::remainder(error, start.turns[j]);
-          EXPECT_NEAR(added.pulls[i * seen + j], 2.0 * start.weights[j] * error, 1e-12) << set.instruction_set;
+          EXPECT_NEAR(added.pulls[i * seen + j], 2.0 * start.weight(i, j) * error, 1e-12) << set.instruction_set;
         }
     }
   }

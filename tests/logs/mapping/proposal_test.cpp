@@ -48,12 +48,21 @@ TEST(Proposal, FindsWhatRobotsOfRosSay) {
 TEST(Proposal, TellsOfFixesThatAreNowBetterNowWorse) {
   Survey survey;
   survey.topics = {topic("/fix", "sensor_msgs/msg/NavSatFix", {"latitude", "longitude", "altitude", "status.status"})};
-  FieldSurvey& status = survey.topics[0].fields[3];
+  survey.topics[0].fields.push_back({.name = "position_covariance[0]", .count = 10, .least = 1.0, .most = 1.0});
+  FieldSurvey &status = survey.topics[0].fields[3], &variance = survey.topics[0].fields[4];
   status.least = -1.0;
   status.most = 2.0;
   const std::string proposal = propose_signals(survey, described());
   EXPECT_THAT(proposal, testing::HasSubstr("when: {of: \"/fix:status.status\", at_least: 2}"));
   EXPECT_EQ(from(proposal, "x_gps"), "/fix:");
+  EXPECT_THAT(proposal, testing::Not(testing::HasSubstr("variance")));
+  variance.least = 1e-4;
+  variance.most = 4.0;
+  EXPECT_THAT(propose_signals(survey, described()),
+              testing::AllOf(testing::HasSubstr("0.01 to 2 m to the east"),
+                             testing::HasSubstr("variance: \"/fix:position_covariance[0]\", and [4] to the north")));
+  variance.least = 2.0;
+  EXPECT_THAT(propose_signals(survey, described()), testing::Not(testing::HasSubstr("variance")));
   status.most = 0.0;  // fixes and none
   EXPECT_THAT(propose_signals(survey, described()), testing::Not(testing::HasSubstr("when:")));
 }

@@ -68,6 +68,14 @@ TEST(SignalMap, MistakesNameTheirPlaceAndARemedy) {
   EXPECT_THAT(message_of("outputs: {x_gps: {from: a, when: {off: b}}}"), HasSubstr("did you mean 'of'"));
   EXPECT_THAT(message_of("outputs:\n  x_gps: {from: /a:x, when: {of: '/b:y', at_most: 1}}"),
               AllOf(HasSubstr("robot.yaml:2"), HasSubstr("'/b:y' is in other records"), HasSubstr("of /a")));
+  EXPECT_THAT(message_of("outputs: {x_gps: {from: a, sigma: b, variance: c}}"), HasSubstr("beside `sigma`"));
+  EXPECT_THAT(message_of("outputs: {x_gps: {from: a, sigma: [b]}}"), HasSubstr("or the name of a column"));
+  EXPECT_THAT(message_of("inputs: {v: {from: a, sigma: b}}"), HasSubstr("is for outputs"));
+  EXPECT_THAT(message_of("outputs: {x_gps: {from: /fix, as: east, variance: /fix}}"),
+              HasSubstr("'/fix:position_covariance[0]'"));
+  EXPECT_THAT(message_of("outputs:\n  x_gps: {from: /a:x, variance: '/b:y'}"),
+              AllOf(HasSubstr("robot.yaml:2"), HasSubstr("variance"), HasSubstr("'/b:y' is in other records")));
+  EXPECT_THAT(message_of("outputs: {x_gps: {from: a, sigma_scale: 0}}"), HasSubstr("sigma_scale"));
   EXPECT_THAT(message_of("origin: [1]"), HasSubstr("latitude, longitude and height"));
   EXPECT_THAT(message_of("origin: [100, 0, 0]"), HasSubstr("within 90 degrees"));
   EXPECT_THAT(message_of("inputs: {delta_rate: {from: [a, b], as: turn, unit: m/s}}"), HasSubstr("`track`"));

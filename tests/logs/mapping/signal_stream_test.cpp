@@ -59,6 +59,35 @@ TEST_F(SignalStreamTest, AConditionLeavesValuesOut) {
   for (const SignalCount& count : stream.counts()) EXPECT_EQ(count.left_out, count.is_output ? 3 : 0) << count.variable;
 }
 
+/// In the variable's unit; what is not above 0 is not known.
+TEST_F(SignalStreamTest, RecordsSayHowAccurateTheyAre) {
+  const auto log = open_csv(write("d.csv",
+                                  "time,e,var,psi,sd,v\n1,10,0.04,90,2,5\n2,20,0,90,,5\n3,30,-1,90,1,5\n"
+                                  "4,40,1e-8,,3,5\n"));
+  SignalStream stream(*log, map("outputs: {delta: none, y_gps: none, x_gps: {from: e, variance: var, sigma_scale: 1.5, "
+                                "least_sigma: 0.01}, psi_m: {from: psi, unit: deg, sign: -1, sigma: sd}}\n"
+                                "inputs: {delta_rate: none}"));
+  std::vector<SignalRow> found;
+  log->read(stream.wanted(), [&](const Record& record) {
+    for (const SignalRow& row : stream.take(record))
+      if (row.is_output) found.push_back(row);
+    return true;
+  });
+  ASSERT_EQ(found.size(), 4u);
+  const std::size_t x = 0, psi = 2;
+  EXPECT_NEAR(found[0].sigmas[x], 0.3, 1e-12);
+  EXPECT_NEAR(found[0].sigmas[psi], 2.0 * M_PI / 180.0, 1e-12);
+  EXPECT_TRUE(found[1].sigmas.empty());
+  EXPECT_TRUE(std::isnan(found[2].sigmas[x]));
+  EXPECT_NEAR(found[2].sigmas[psi], M_PI / 180.0, 1e-12);
+  EXPECT_EQ(found[3].sigmas[x], 0.01);
+  EXPECT_TRUE(std::isnan(found[3].sigmas[psi])) << "of a value that is missing";
+  const SignalCount count = stream.counts()[0];
+  EXPECT_EQ(count.stated, 2);
+  EXPECT_EQ(count.least_sigma, 0.01);
+  EXPECT_NEAR(count.most_sigma, 0.3, 1e-12);
+}
+
 TEST_F(SignalStreamTest, ACounterpartTakesWhatAnotherLeavesOut) {
   const auto log = open_csv(write("d.csv", "time,e,status,v\n1,10,2,5\n2,20,1,5\n3,30,2,5\n"));
   SignalStream stream(*log,

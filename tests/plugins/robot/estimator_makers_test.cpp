@@ -26,8 +26,8 @@ class Stubborn final : public EstimationMethod {
   explicit Stubborn(const EstimatorParts& parts) : model_(parts.context->model), mean_(parts.initial_mean) {}
   const Model& model() const noexcept override { return *model_; }
   int substeps() const noexcept override { return 1; }
-  void start(const double*) noexcept override {}
-  void add(const MeasuredInterval&, const double*) noexcept override {}
+  void start(Measured) noexcept override {}
+  void add(const MeasuredInterval&, Measured) noexcept override {}
   void estimate(Estimate& result, Clock::time_point) noexcept override {
     result.state = mean_.head(model_->state_count());
     result.parameters = mean_.tail(model_->parameter_count());

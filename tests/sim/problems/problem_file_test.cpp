@@ -95,7 +95,7 @@ TEST(ProblemFile, NamesThePlaceAndTheRemedy) {
       {rhe_line, "\"substeps\": 2", "\"substeps\": 0", "horizon.substeps", "at least 1"},
       {rhe_line, "[null, 3]", "[4, 3]", "bounds.speed", "lower <= upper"},
       {rhe_line, "[null, 3]", "[4]", "bounds.speed", "[lower, upper]"},
-      {rhe_line, "{\"id\"", "{\"version\": 5, \"id\"", "version", "found 5, expected 1 .. 4"},
+      {rhe_line, "{\"id\"", "{\"version\": 6, \"id\"", "version", "found 6, expected 1 .. 5"},
       {rhe_line, "{\"id\"", "{\"version\": \"2\", \"id\"", "version", "an integer"},
       {rhe_line, "{\"id\"", "{\"origin\": {}, \"id\"", "origin", "is a key of version 2; add \"version\": 2"},
       {rhe_line, "{\"id\"", "{\"version\": 1, \"robust\": [], \"id\"", "robust", "is a key of version 2"},

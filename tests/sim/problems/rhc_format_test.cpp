@@ -118,7 +118,7 @@ TEST(RhcFormat, StoresTermsWithTheirOptionsAndData) {
       build(bad[0], model);
     });
   };
-  EXPECT_THAT(wrong("\"version\":4", "\"version\":3"), ::testing::HasSubstr("is a key of version 4"));
+  EXPECT_THAT(wrong("\"version\":5", "\"version\":3"), ::testing::HasSubstr("is a key of version 4"));
   EXPECT_THAT(wrong("\"name\":\"effort\"", "\"name\":\"efort\""), ::testing::HasSubstr("set.jsonl:3: terms[2]: "));
   EXPECT_THAT(wrong("\"most\":2", "\"most\":3"),
               ::testing::HasSubstr("terms[1].data[0]: 14 numbers, expected 21 for the term 'obstacles'"));

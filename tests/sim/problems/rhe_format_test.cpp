@@ -14,6 +14,8 @@ namespace rhec::sim {
 namespace rhe_format_test {
 
 using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::Not;
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
 TEST(RheFormat, BuildsAnEstimationProblem) {
@@ -95,6 +97,34 @@ TEST(RheFormat, KeepsMeasurementsBetweenNodes) {
                      "set.jsonl", 3),
         Error)
         << wrong;
+}
+
+TEST(RheFormat, KeepsHowMuchSingleMeasurementsCount) {
+  const std::string between = "\"between\": [[], [[0.05, 1.25], [0.1, null]], [[0.25, 2.5]]]";
+  const auto line_with = [&](const std::string& weights) {
+    return replaced(rhe_line_2, "\"version\": 2", "\"version\": 5, " + between + ", \"relative_weights\": " + weights);
+  };
+  const std::string weights = R"({"outputs": [[1], [4], [0.25], [1]], "between": [[], [[2], [1]], [[0.5]]]})";
+  const ProblemRecord record = read_problem(line_with(weights), "set.jsonl", 3);
+  const auto problem = build(record, cart());
+  const auto& rhe = dynamic_cast<const RheProblem&>(*problem);
+  EXPECT_EQ(rhe.measured(1).weight(0), 4.0);
+  EXPECT_EQ(rhe.between(1).measured(0).weight(0), 2.0);
+  EXPECT_EQ(rhe.between(2).measured(0).weight(0), 0.5);
+  const std::string again = problem_line(record_of(rhe, nullptr, record.id, record.model, record.model_options));
+  EXPECT_THAT(again, HasSubstr("\"relative_weights\""));
+  EXPECT_EQ(problem_line(read_problem(again, "set.jsonl", 3)), again);
+  const auto copy = build(read_problem(again, "set.jsonl", 3), cart());
+  EXPECT_EQ(dynamic_cast<const RheProblem&>(*copy).between(2).measured(0).weight(0), 0.5);
+  for (const char* wrong :
+       {R"({"outputs": [[1], [4], [0.25]]})", R"({"outputs": [[1], [0], [0.25], [1]]})",
+        R"({"outputs": [[1, 1], [4, 1], [0.25, 1], [1, 1]]})", R"({"outputs": [[1], [4], [1], [1]], "between": [[]]})",
+        R"({"outputs": [[1], [4], [1], [1]], "between": [[], [[2]], [[0.5]]]})", R"({"between": []})"})
+    EXPECT_THROW(read_problem(line_with(wrong), "set.jsonl", 3), Error) << wrong;
+  const std::string usual = line_with(R"({"outputs": [[1], [1], [1], [1]]})");
+  const auto same = build(read_problem(usual, "set.jsonl", 3), cart());
+  EXPECT_THAT(problem_line(record_of(dynamic_cast<const RheProblem&>(*same), nullptr, "a", record.model, {})),
+              Not(HasSubstr("relative_weights")));
 }
 
 TEST(RheFormat, AnEstimatorsFirstWindowHasNoInterval) {

@@ -101,6 +101,36 @@ inputs: {speed: "/joint_states:velocity[wheel]"}
   EXPECT_NE(count.last.find("signals.SIGNAL.when"), std::string::npos);
 }
 
+TEST_F(IntakeTest, FixesStateTheirAccuracy) {
+  const Settings weighed = parse_yaml(R"(
+outputs:
+  x: {from: /fix, as: east, variance: "/fix:position_covariance[0]"}
+  y: {from: /fix, as: north, variance: "/fix:position_covariance[4]"}
+  angle: none
+inputs: {speed: "/joint_states:velocity[wheel]"}
+)",
+                                      "test");
+  const LiveTopics topics(weighed, Settings(), {});
+  Intake intake(topics, logs::SignalMap(weighed, vehicle()), vehicle(), {.behind = 2.0, .ahead = 0.2});
+  const auto row_of = [&](double variance, int kind) {
+    MessageWriter writer(topics.message_type(topics.topic("/fix")));
+    writer.set("latitude", 51.0);
+    writer.set("longitude", 7.0);
+    writer.set("position_covariance[0]", variance);
+    writer.set("position_covariance[4]", 4.0 * variance);
+    writer.set("position_covariance_type", kind);
+    const auto rows = intake.take(topics.topic("/fix"), writer.write(now, "gps"), now);
+    return rows.empty() ? logs::SignalRow() : rows.front();
+  };
+  const logs::SignalRow known = row_of(0.01, 2), unknown = row_of(0.01, 0);
+  ASSERT_EQ(known.sigmas.size(), 3u);
+  EXPECT_NEAR(known.sigmas[0], 0.1, 1e-12);
+  EXPECT_NEAR(known.sigmas[1], 0.2, 1e-12);
+  EXPECT_TRUE(std::isnan(known.sigmas[2]));
+  EXPECT_EQ(unknown.values.size(), 3u);
+  EXPECT_TRUE(unknown.sigmas.empty()) << "COVARIANCE_TYPE_UNKNOWN";
+}
+
 TEST_F(IntakeTest, StampsThatCannotBeAreRefused) {
   EXPECT_EQ(fix(51.0, 0, 0.0, 0, now - 3 * second), 0u);
   EXPECT_EQ(fix(51.0, 0, 0.0, 0, now + second), 0u);

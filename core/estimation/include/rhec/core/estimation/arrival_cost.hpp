@@ -63,6 +63,7 @@ class RHEC_EXPORT ArrivalCost {
   void write(RheProblem& problem) noexcept;
 
  private:
+  void find_weights(const RheProblem& problem, const Iterate& solution) noexcept;
   void filter_first_interval(const RheProblem& problem, const Iterate& solution) noexcept;
   int write_between(const RheProblem& problem, const Iterate& solution, int row) noexcept;
   void smooth_first_interval(const RheProblem& problem, const Iterate& solution) noexcept;
@@ -75,7 +76,7 @@ class RHEC_EXPORT ArrivalCost {
   Eigen::MatrixXd initial_covariance_;
   /// For each measurement between the first two nodes: its weights, and its residuals with their gradients.
   std::vector<double> between_weights_, between_rows_, between_scratch_;
-  std::vector<double> robust_, inputs_, ends_, scratch_, ramp_variances_, next_, jacobian_, predicted_,
+  std::vector<double> weights_, inputs_, ends_, scratch_, ramp_variances_, next_, jacobian_, predicted_,
       output_jacobian_;
   /// Pi = D L L' D with D diagonal, so that the units of one variable do not affect the precision of another.
   Eigen::VectorXd scale_;

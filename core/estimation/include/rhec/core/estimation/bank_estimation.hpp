@@ -29,8 +29,8 @@ class RHEC_EXPORT BankEstimation final : public EstimationMethod {
 
   const Model& model() const noexcept override { return history_.bank().model(); }
   int substeps() const noexcept override { return setup_.bank.substeps; }
-  void start(const double* outputs) noexcept override;
-  void add(const MeasuredInterval& interval, const double* outputs) noexcept override;
+  void start(Measured outputs) noexcept override;
+  void add(const MeasuredInterval& interval, Measured outputs) noexcept override;
   int most_between() const noexcept override { return setup_.bank.most_between; }
   int reach() const noexcept override;
   int most_reach() const noexcept override;

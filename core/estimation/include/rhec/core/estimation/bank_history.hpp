@@ -23,17 +23,17 @@ class RHEC_EXPORT BankHistory {
   const PriorBank& bank() const noexcept { return bank_; }
 
   /// The first node that is remembered, with its outputs (n_y, NaN where missing). The bank was reset before.
-  void start(const double* outputs, std::int64_t number = 0) noexcept;
+  void start(Measured outputs, std::int64_t number = 0) noexcept;
   /// The next node, after what was measured since the last. There is room for as many measurements between nodes as the
   /// bank was set up for.
-  void add(const MeasuredInterval& interval, const double* outputs) noexcept;
-  void add(double duration, const double* inputs, const double* outputs) noexcept { add({duration, inputs}, outputs); }
+  void add(const MeasuredInterval& interval, Measured outputs) noexcept;
+  void add(double duration, const double* inputs, Measured outputs) noexcept { add({duration, inputs}, outputs); }
   /// Takes the newest nodes back, as if they had never been added; false, and nothing happens, unless one is left that
   /// is remembered.
   bool rewind(int nodes) noexcept;
   /// Adds outputs to the node `back` before the newest one; where there are some already, they are replaced. Returns
   /// false if that node is forgotten.
-  bool amend(int back, const double* outputs) noexcept;
+  bool amend(int back, Measured outputs) noexcept;
   /// Weights of a remembered node's outputs (n_y, NaN: none) that are better known than from its innovations, as a
   /// window knows them when the node leaves it. Where they differ much from those used, it is filtered anew from there.
   bool reweigh(std::int64_t number, const double* robust_weights) noexcept;
@@ -48,8 +48,9 @@ class RHEC_EXPORT BankHistory {
   int capacity() const noexcept { return static_cast<int>(intervals_.size()); }
 
   struct Node {
-    double duration = 0.0, distance = 0.0;                ///< of the interval before the node [s, m]
-    const double *inputs, *outputs;                       ///< n_u on that interval, n_y
+    double duration = 0.0, distance = 0.0;  ///< of the interval before the node [s, m]
+    const double* inputs;                   ///< n_u on that interval
+    Measured outputs;
     const BetweenNodes* between;                          ///< of that interval
     const double* predicted;                              ///< PriorBank::save before the outputs were used
     const double* robust_weights = nullptr;               ///< n_y, that the outputs had
@@ -81,7 +82,8 @@ class RHEC_EXPORT BankHistory {
   std::size_t nu_, ny_, np_;
   std::vector<Interval> intervals_;
   std::vector<BetweenNodes> between_;
-  std::vector<double> inputs_, outputs_;
+  std::vector<double> inputs_;
+  std::vector<MeasuredOutputs> outputs_;
   std::vector<double> given_weights_, used_weights_;  ///< n_y a node
   AlignedDoubles predicted_, filtered_, rehearsed_;
   std::vector<double> means_, covariances_;

@@ -21,8 +21,8 @@ class RHEC_EXPORT BankedCovariance final : public WindowedEstimation {
 
   const Model& model() const noexcept override { return blocks_->model(); }
   int substeps() const noexcept override { return blocks_->substeps(); }
-  void start(const double* outputs) noexcept override;
-  void add(const MeasuredInterval& interval, const double* outputs) noexcept override;
+  void start(Measured outputs) noexcept override;
+  void add(const MeasuredInterval& interval, Measured outputs) noexcept override;
   int most_between() const noexcept override { return std::min(blocks_->most_between(), bank_.most_between()); }
   int reach() const noexcept override { return std::min(blocks_->reach(), bank_.reach()); }
   int most_reach() const noexcept override { return std::min(blocks_->most_reach(), bank_.most_reach()); }

@@ -21,13 +21,11 @@ class RHEC_EXPORT EstimationMethod {
   // Outputs and inputs are finite, or NaN if missing (see `cleaned`).
 
   /// The first node, with its measured outputs (n_y).
-  virtual void start(const double* outputs) noexcept = 0;
+  virtual void start(Measured outputs) noexcept = 0;
   /// The next node, after what was measured since the last, with its measured outputs. With a duration that is not
   /// positive, the outputs belong to the newest node instead.
-  virtual void add(const MeasuredInterval& interval, const double* outputs) noexcept = 0;
-  void add_node(double duration, const double* inputs, const double* outputs) noexcept {
-    add({duration, inputs}, outputs);
-  }
+  virtual void add(const MeasuredInterval& interval, Measured outputs) noexcept = 0;
+  void add_node(double duration, const double* inputs, Measured outputs) noexcept { add({duration, inputs}, outputs); }
   /// How many measurements an interval can have between its nodes.
   virtual int most_between() const noexcept { return 0; }
   /// How many of the newest nodes `rewind` can take back at present; all nodes: as if nothing had been started. And the

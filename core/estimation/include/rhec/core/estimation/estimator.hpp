@@ -32,6 +32,9 @@ class RHEC_EXPORT Estimator {
     /// By output, how much later than it was measured it is stamped [s]; none: not at all. Outputs of one measurement
     /// go to the times at which each was measured.
     std::vector<double> delays = {};
+    /// By output, the standard deviation of the noise that the method takes it to have: what those that a measurement
+    /// has of its own are held against. None: those of the judge; without one, measurements have none of their own.
+    std::vector<double> output_sigmas = {};
     /// For so long a call whose deadline has passed goes on with what waits, beside one row and one node [s]: an
     /// estimator that is always late keeps up.
     double grace = 5e-4;
@@ -43,8 +46,10 @@ class RHEC_EXPORT Estimator {
   /// have a health, innovations, and covariances that grow while nothing is measured.
   Estimator(std::unique_ptr<EstimationMethod> method, const Timeline& timeline, std::unique_ptr<SensorWatch> watch);
 
-  /// Measured y (n_y, NaN where missing) at a time [s].
-  void push_measurement(double time, const double* outputs) noexcept;
+  /// Measured y (n_y, NaN where missing) at a time [s]. `sigmas` (n_y, or null): standard deviations of this
+  /// measurement, e.g. as its receiver states them; those that are not above 0 are as always. A measurement counts for
+  /// no more than one that is a hundred times more accurate than usual, and is missing if its deviation is infinite.
+  void push_measurement(double time, const double* outputs, const double* sigmas = nullptr) noexcept;
   /// Measured u (n_u, of the vehicle alone; NaN where missing), which holds from a time [s] on.
   void push_input(double time, const double* inputs) noexcept;
 
@@ -96,12 +101,13 @@ class RHEC_EXPORT Estimator {
   const Model& model() const noexcept { return method_->model(); }
 
  private:
-  void push(double time, const double* outputs) noexcept;
-  void push_judged(double time, const double* outputs) noexcept;
+  const double* weigh(const double* sigmas) noexcept;
+  void push(double time, Measured outputs) noexcept;
+  void push_judged(double time, Measured outputs) noexcept;
   double place_on_timeline(double stamp, int source) noexcept;
   double place_on_timeline(double stamp, const double* outputs) noexcept;
   bool judge_waiting(double until, Clock::time_point deadline) noexcept;
-  SensorWatch::Finding judge(double time, double* outputs, Clock::time_point deadline) noexcept;
+  SensorWatch::Finding judge(double time, double* outputs, const double* weights, Clock::time_point deadline) noexcept;
   int inputs_source() const noexcept { return static_cast<int>(presence_.size()); }
   double longest_silence(int source) const noexcept;
   template <class Function>
@@ -126,13 +132,13 @@ class RHEC_EXPORT Estimator {
   Clock::duration solving_{};        ///< how long the last estimate took behind its nodes, if it had a deadline
   double worst_error_ = 0.0;         ///< of the intervals that were coarse
   std::size_t measured_inputs_ = 0;  ///< all but process noise, which is 0
-  std::vector<double> input_, next_, values_, delayed_;
+  std::vector<double> input_, next_, values_, delayed_, sigmas_, weights_;
   // With a judge:
   std::unique_ptr<SensorWatch> watch_;
   std::unique_ptr<Clocks> clocks_;        ///< of the sensors, and last of the inputs
-  std::unique_ptr<StampedRows> waiting_;  ///< measurements that are not judged yet
+  std::unique_ptr<StampedRows> waiting_;  ///< measurements that are not judged yet: outputs, then their weights
   double watched_ = 0.0;                  ///< time of the last sample that was judged
-  std::vector<double> merged_, input_sigmas_;
+  std::vector<double> merged_, merged_weights_, row_, input_sigmas_;
   std::vector<SensorWatch::Presence> presence_;
 };
 

@@ -31,8 +31,8 @@ class RHEC_EXPORT FilterEstimation final : public EstimationMethod {
 
   const Model& model() const noexcept override { return bank_.front().filter.model(); }
   int substeps() const noexcept override { return setup_.substeps; }
-  void start(const double* outputs) noexcept override;
-  void add(const MeasuredInterval& interval, const double* outputs) noexcept override;
+  void start(Measured outputs) noexcept override;
+  void add(const MeasuredInterval& interval, Measured outputs) noexcept override;
   int most_between() const noexcept override { return setup_.most_between; }
   int reach() const noexcept override;
   int most_reach() const noexcept override { return setup_.remembered_nodes + 1; }
@@ -60,8 +60,8 @@ class RHEC_EXPORT FilterEstimation final : public EstimationMethod {
   };
   Node& node(std::int64_t number) noexcept { return nodes_[static_cast<std::size_t>(number) % nodes_.size()]; }
   void remember() noexcept;
-  void take(const double* outputs) noexcept;
-  double log_likelihood(const KalmanFilter& filter, const double* outputs) noexcept;
+  void take(Measured outputs) noexcept;
+  double log_likelihood(const KalmanFilter& filter, Measured outputs) noexcept;
 
   Setup setup_;
   std::vector<Hypothesis> bank_;

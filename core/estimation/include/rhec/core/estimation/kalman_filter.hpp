@@ -35,8 +35,9 @@ class RHEC_EXPORT KalmanFilter {
   Eigen::VectorXd mean;        ///< n_x + n_p
   Eigen::MatrixXd covariance;  ///< symmetric positive semidefinite
 
-  /// Measurement update with y (n_y, NaN where missing). `robust_weights` (n_y, or null) scale the information.
-  void update(const double* y, const double* robust_weights) noexcept;
+  /// Measurement update with y (n_y, NaN where missing). `information_weights` (n_y, or null) take the place of those
+  /// that y was measured with.
+  void update(Measured y, const double* information_weights = nullptr) noexcept;
   /// Time update by `duration` [s] with a measured input (n_u). Where it is missing (NaN), the guess replaces it, with
   /// a standard deviation of a hundred times the variable's typical magnitude.
   void predict(const double* measured_input, const double* input_guess, double duration) noexcept;
@@ -44,9 +45,10 @@ class RHEC_EXPORT KalmanFilter {
   void predict(const double* measured_input, const double* input_guess, double duration,
                const double* ramp_variances) noexcept;
   /// The same, and each measurement between the two nodes is used at its own time. The noise of an input, and the
-  /// change of a parameter, is one value over the interval. `robust_weights`: one row for each of them, or null.
+  /// change of a parameter, is one value over the interval. `information_weights`: one row for each of them, in place
+  /// of those that they were measured with, or null.
   ///
-  /// Outputs of motion that are read often are summarised (ReadingSummary), unless there are robust weights.
+  /// Outputs of motion that are read often are summarised (ReadingSummary), unless there are such weights.
   ///
   /// `end_outputs` (n_y, NaN where missing, or null) are those of the interval's end, for `update` to use afterwards.
   /// An output of motion is a product of slip and of an input that is measured as well: about the measured input, the
@@ -55,11 +57,11 @@ class RHEC_EXPORT KalmanFilter {
   /// Bell and Cathey 1993). What is left of a product is not known better than its factors are: their second-order
   /// terms have means and covariances (Curvature; docs/method.md, section 5).
   void predict(const MeasuredInterval& interval, const double* input_guess, const double* ramp_variances,
-               const double* robust_weights = nullptr, const double* end_outputs = nullptr) noexcept;
+               const double* information_weights = nullptr, Measured end_outputs = nullptr) noexcept;
   /// Where `predict` would linearise an interval with outputs of motion, and its second-order terms. Mean and
   /// covariance stay. Returns the interval with its measurements as they are used, until the next call.
   MeasuredInterval look_ahead(const MeasuredInterval& interval, const double* input_guess, const double* ramp_variances,
-                              const double* robust_weights, const double* end_outputs) noexcept;
+                              const double* information_weights, Measured end_outputs) noexcept;
   const ReadingSummary& summary() const noexcept { return summary_; }
   /// [x; p; u; change of p], and then others.
   const Eigen::VectorXd& point() const noexcept { return point_; }
@@ -97,12 +99,12 @@ class RHEC_EXPORT KalmanFilter {
   static double from_first(const MeasuredInterval& interval, double seconds) noexcept;
   void linearise_times(const MeasuredInterval& interval, int count, const double* seconds) noexcept;
   void use_time(const MeasuredInterval& interval, int which) noexcept;
-  void find_next_point(const double* y) noexcept;
+  void find_next_point(Measured y) noexcept;
   void take_between(const MeasuredInterval& interval, int which, const double* weights) noexcept;
   void take_wide(double innovation, double variance) noexcept;
   void narrow() noexcept;
   double input_variance(int input, const double* measured) const noexcept;
-  void take_outputs(const double* y, const double* robust_weights) noexcept;
+  void take_outputs(Measured y) noexcept;
   void linearise_outputs() noexcept;
   void take_output(int output, double measured, double variance) noexcept;
   void make_symmetric() noexcept;

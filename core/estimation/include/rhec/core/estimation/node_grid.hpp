@@ -37,7 +37,7 @@ class RHEC_EXPORT NodeGrid {
   /// What became of a measurement: it waits; it belongs to older nodes, which will be made anew; it is too old.
   enum class Place { waits, late, forgotten };
   /// `reach`: how many of the newest nodes can be taken back now.
-  Place push_measurement(double time, const double* outputs, int reach) noexcept;
+  Place push_measurement(double time, Measured outputs, int reach) noexcept;
   void push_input(double time, const double* inputs) noexcept;
 
   /// How many of the newest nodes have to be taken back, at most `reach`, for what is stamped up to a time.
@@ -60,7 +60,7 @@ class RHEC_EXPORT NodeGrid {
   double start() const noexcept { return start_; }
   /// Of the newest node: its time, its outputs, and what was measured on the way to it.
   double time() const noexcept { return node(count_ - 1).time; }
-  const double* outputs() const noexcept { return outputs_.data(); }
+  Measured outputs() const noexcept { return outputs_.measured(); }
   MeasuredInterval interval() const noexcept { return between_.over(duration_, mean_.data()); }
   /// Whether the newest node gives way to the next measurement.
   bool ends_open() const noexcept { return count_ > 0 && node(count_ - 1).kind == Kind::end; }
@@ -88,12 +88,14 @@ class RHEC_EXPORT NodeGrid {
   std::size_t group_end(std::size_t row) const noexcept;
   Node next_node(const Node& last, std::size_t from, std::size_t end) const noexcept;
   void collect(const Node& next, std::size_t from, std::size_t end) noexcept;
-  void merge(std::size_t row, std::size_t end, double* outputs) const noexcept;
+  Measured measured(std::size_t row) const noexcept {
+    return {measurements_.values(row), measurements_.values(row) + setup_.outputs};
+  }
 
   Setup setup_;
-  double near_;  ///< how far a node is moved at most [s]
-  StampedRows measurements_, inputs_;
-  std::vector<Node> nodes_;  ///< the newest ones, in a ring
+  double near_;                        ///< how far a node is moved at most [s]
+  StampedRows measurements_, inputs_;  ///< of measurements: outputs, then their weights
+  std::vector<Node> nodes_;            ///< the newest ones, in a ring
   std::int64_t count_ = 0;
   double start_ = 0.0;
   double changed_, changed_input_;  ///< stamps of the oldest rows that came behind nodes
@@ -101,7 +103,8 @@ class RHEC_EXPORT NodeGrid {
   std::int64_t dropped_ = 0;
   double duration_ = 0.0;
   BetweenNodes between_;
-  std::vector<double> outputs_, mean_, weight_;
+  MeasuredOutputs outputs_;
+  std::vector<double> row_, mean_, weight_;
 };
 
 }  // namespace rhec

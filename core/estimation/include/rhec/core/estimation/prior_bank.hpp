@@ -38,7 +38,7 @@ class RHEC_EXPORT PriorBank {
                        const Eigen::Ref<const Eigen::MatrixXd>& covariance) noexcept;
   /// Measurement update with y (n_y, NaN where missing). `robust_weights` (n_y, or null) take the place of those that
   /// the robust losses give to the innovations; NaN: none.
-  void update(const double* y, const double* robust_weights = nullptr) noexcept;
+  void update(Measured y, const double* robust_weights = nullptr) noexcept;
   /// The weight, above 0 and at most 1, by which the last update scaled an output's information, for the most probable
   /// member; 1 without a robust loss.
   double robust_weight(int output) const noexcept;
@@ -49,7 +49,7 @@ class RHEC_EXPORT PriorBank {
   /// process is one value over the interval, as a window has it, so that the moments are those of a window.
   /// `end_outputs` (n_y, NaN where missing, or null) are those of the interval's end, for `update` to use afterwards:
   /// the interval is linearised where its outputs of motion put it, as by KalmanFilter::predict.
-  void predict(const MeasuredInterval& interval, const double* end_outputs = nullptr) noexcept;
+  void predict(const MeasuredInterval& interval, Measured end_outputs = nullptr) noexcept;
   /// Whether that depends on the outputs of the interval's end.
   bool looks_ahead() const noexcept { return !setup_.motion_outputs.empty(); }
 
@@ -129,13 +129,13 @@ class RHEC_EXPORT PriorBank {
   void widen() noexcept;
   bool is_of_motion(int output) const noexcept;
   void write_wide_gradient(int output, double share, double from_first, double* gradient) const noexcept;
-  MeasuredInterval look_ahead(const MeasuredInterval& measured, const double* end_outputs) noexcept;
+  MeasuredInterval look_ahead(const MeasuredInterval& measured, Measured end_outputs) noexcept;
   const double* reading_weights(int which) const noexcept;
   void weigh_readings(int which) noexcept;
-  void linearise_about_point(const MeasuredInterval& interval, const double* end_outputs) noexcept;
+  void linearise_about_point(const MeasuredInterval& interval, Measured end_outputs) noexcept;
   void linearise_outputs(int which, const double* y, double share, double from_first) noexcept;
   void expect_outputs(int which, const double* y, const double* mean) noexcept;
-  bool move_point(const MeasuredInterval& interval, const double* end_outputs) noexcept;
+  bool move_point(const MeasuredInterval& interval, Measured end_outputs) noexcept;
   void add_curvature(double from_first) noexcept;
   double curvature_factor(int state, int factor, double from_first) const noexcept;
   void take_step_from_point() noexcept;
@@ -158,7 +158,7 @@ class RHEC_EXPORT PriorBank {
   double robust_surplus(const double* y, int sensor, int lane) const noexcept;
   int most_probable() const noexcept;
   void reset_noise() noexcept;
-  void spread_variances() noexcept;
+  void spread_variances(const double* weights = nullptr) noexcept;
   int own_places(int member, int parameter, int* places) const noexcept;
 
   std::shared_ptr<const Model> model_;
@@ -179,10 +179,12 @@ class RHEC_EXPORT PriorBank {
   AlignedDoubles wide_mean_, wide_before_, wide_covariance_, wide_work_, transition_;
   /// Per measurement between the nodes, and for the end: outputs as expected at `point_`, and their gradients.
   AlignedDoubles wide_predicted_, wide_gradient_;
-  AlignedDoubles point_;              ///< where the interval is linearised
-  std::unique_ptr<LookAhead> ahead_;  ///< null without outputs of motion
-  bool is_curved_ = false;            ///< whether the interval has second-order terms
-  std::vector<double> added_;         ///< n_y: variances of second-order terms
+  AlignedDoubles point_;                ///< where the interval is linearised
+  bool is_weighed_ = false;             ///< whether the outputs of the last update had weights: these
+  std::vector<double> stated_weights_;  ///< n_y
+  std::unique_ptr<LookAhead> ahead_;    ///< null without outputs of motion
+  bool is_curved_ = false;              ///< whether the interval has second-order terms
+  std::vector<double> added_;           ///< n_y: variances of second-order terms
   // Rows of the model: one per member.
   std::vector<double> states_, inputs_, parameters_, ends_, durations_, next_rows_, jacobian_rows_, output_rows_,
       gradient_rows_;

@@ -40,8 +40,8 @@ class RHEC_EXPORT PriorHorizonEstimation final : public WindowedEstimation {
 
   const Model& model() const noexcept override { return filters_.model(); }
   int substeps() const noexcept override { return problem_.substeps(); }
-  void start(const double* outputs) noexcept override;
-  void add(const MeasuredInterval& interval, const double* outputs) noexcept override;
+  void start(Measured outputs) noexcept override;
+  void add(const MeasuredInterval& interval, Measured outputs) noexcept override;
   int most_between() const noexcept override { return filters_.most_between(); }
   int reach() const noexcept override { return filters_.reach(); }
   int most_reach() const noexcept override { return filters_.most_reach(); }

@@ -27,7 +27,8 @@ class RHEC_EXPORT ReadingSummary {
   MeasuredInterval operator()(const MeasuredInterval& interval) noexcept;
   /// Measurements that there can be afterwards.
   int most() const noexcept { return static_cast<int>(times_.size()); }
-  /// How many measurements each output of the summarised interval stands for: rows of n_y, in the order of its times.
+  /// How many measurements of usual accuracy each output of the summarised interval stands for, rows of n_y in the
+  /// order of its times: sums of the weights of those that were measured.
   const double* weights() const noexcept { return weights_.data(); }
 
  private:

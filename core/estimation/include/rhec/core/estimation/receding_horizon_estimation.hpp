@@ -54,8 +54,8 @@ class RHEC_EXPORT RecedingHorizonEstimation final : public WindowedEstimation {
   /// As it was given: all process noise is an input. In that of the problem, blocked noises are parameters, the last.
   const Model& model() const noexcept override { return *model_; }
   int substeps() const noexcept override { return problem_.substeps(); }
-  void start(const double* outputs) noexcept override;
-  void add(const MeasuredInterval& interval, const double* outputs) noexcept override;
+  void start(Measured outputs) noexcept override;
+  void add(const MeasuredInterval& interval, Measured outputs) noexcept override;
   int most_between() const noexcept override { return setup_.problem.most_between; }
   int reach() const noexcept override;
   int most_reach() const noexcept override { return setup_.problem.max_intervals + 1; }
@@ -77,7 +77,8 @@ class RHEC_EXPORT RecedingHorizonEstimation final : public WindowedEstimation {
   /// What was measured on the way to a node, and at it.
   struct Node {
     double duration = 0.0;
-    std::vector<double> inputs, outputs;
+    std::vector<double> inputs;
+    MeasuredOutputs outputs;
     BetweenNodes between;
   };
   /// What is known before the window's first node, and where the blocks began before it.
@@ -91,19 +92,19 @@ class RHEC_EXPORT RecedingHorizonEstimation final : public WindowedEstimation {
   Arrival& arrival_at(std::int64_t first) noexcept {
     return arrivals_[static_cast<std::size_t>(first) % arrivals_.size()];
   }
-  void remember(const MeasuredInterval& interval, const double* outputs, std::int64_t number) noexcept;
+  void remember(const MeasuredInterval& interval, Measured outputs, std::int64_t number) noexcept;
   void remember_arrival() noexcept;
   void restore_arrival() noexcept;
   void set_structure() noexcept;
-  void add_outputs(const double* outputs) noexcept;
+  void add_outputs(Measured outputs) noexcept;
   void take_up_solution() noexcept;
   std::int64_t newest() const noexcept { return window_.first + window_.intervals - (prepared_ ? 1 : 0); }
   std::int64_t first_before_preparing() const noexcept { return window_.first - (prepared_ && slid_ ? 1 : 0); }
-  void advance_window(const MeasuredInterval& interval, const double* outputs) noexcept;
+  void advance_window(const MeasuredInterval& interval, Measured outputs) noexcept;
   void slide_arrival() noexcept;
   void search_heading(Clock::time_point deadline) noexcept;
-  void begin_window(const double* outputs) noexcept;
-  void take_outputs(int node, const double* outputs) noexcept;
+  void begin_window(Measured outputs) noexcept;
+  bool weigh_otherwise(int node, Measured outputs) const noexcept;
   void take_interval(int place, const MeasuredInterval& interval) noexcept;
   void start_cold(Iterate& point) noexcept;
   void recover() noexcept;

@@ -74,13 +74,13 @@ class RHEC_EXPORT SensorWatch {
     /// The estimate has to go on from `mean` and `covariance`, which contain this measurement.
     bool rebase = false;
   };
-  /// Judges outputs (n_y, NaN where missing) of a time [s]; those that must not be used become NaN.
-  Finding judge(double time, double* outputs) noexcept;
+  /// Judges outputs (n_y, NaN where missing; weights as in Measured) of a time [s]; those not to be used become NaN.
+  Finding judge(double time, double* outputs, const double* weights = nullptr) noexcept;
   /// Whether a late measurement of a time passes; those outputs that do not become NaN.
-  void judge_late(double time, double* outputs) noexcept;
+  void judge_late(double time, double* outputs, const double* weights = nullptr) noexcept;
   struct Held {
-    double time = 0.0;            ///< [s]
-    std::vector<double> outputs;  ///< n_y
+    double time = 0.0;  ///< [s]
+    MeasuredOutputs outputs;
   };
   /// Measurements that were rejected and turned out right, before the last one; after `judge` has said so.
   const std::vector<Held>& held() const noexcept { return held_; }
@@ -134,6 +134,7 @@ class RHEC_EXPORT SensorWatch {
   };
   bool admits(std::size_t sensor, const Innovation& innovation) noexcept;
   bool is_still_off(const Record& record, const Innovation& innovation) const noexcept;
+  Measured weighed(const double* outputs) const noexcept;
   void find_stuck(double* outputs) noexcept;
   void note_motion(double duration, const double* inputs) noexcept;
   bool is_searching() const noexcept;
@@ -185,9 +186,9 @@ class RHEC_EXPORT SensorWatch {
   std::vector<SensorHealth> states_;  ///< by sensor
   SensorHealth inputs_;
   std::uint32_t input_findings_ = 0;
-  std::vector<std::uint32_t> findings_;  ///< by sensor, of the last sample
-  std::vector<int> quiet_;               ///< by sensor, samples since the last finding
-  std::vector<double> raw_, input_, believed_input_;
+  std::vector<std::uint32_t> findings_;                             ///< by sensor, of the last sample
+  std::vector<int> quiet_;                                          ///< by sensor, samples since the last finding
+  std::vector<double> raw_, raw_weights_, input_, believed_input_;  ///< weights: none where all are 1
   std::vector<Held> held_;
   int held_count_ = 0;
   std::vector<Innovation> innovations_;

@@ -15,11 +15,17 @@ struct RHEC_EXPORT NodeLog {
   std::vector<double> durations;           ///< of each interval [s], N
   std::vector<double> inputs;              ///< measured, N x n_u, NaN where missing
   std::vector<double> outputs;             ///< N+1 x n_y, NaN where missing
+  std::vector<double> weights;             ///< of these as in Measured; or none at all
   std::vector<BetweenNodes> between;       ///< measurements within each interval, N; or none at all
   std::vector<double> states, parameters;  ///< estimates at each node when it was the newest, N+1 x n_x and n_p
   int intervals() const noexcept { return static_cast<int>(durations.size()); }
   /// Of any interval.
   int most_between() const noexcept;
+  /// What was measured at a node, of `output_count` outputs.
+  Measured measured(int node, int output_count) const noexcept {
+    const std::ptrdiff_t at = static_cast<std::ptrdiff_t>(node) * output_count;
+    return {outputs.data() + at, weights.empty() ? nullptr : weights.data() + at};
+  }
   /// What was measured on one, of `input_count` inputs.
   MeasuredInterval interval(int i, int input_count) const noexcept;
 };
@@ -34,8 +40,8 @@ class RHEC_EXPORT NodeRecorder final : public EstimationMethod {
 
   const Model& model() const noexcept override { return method_->model(); }
   int substeps() const noexcept override { return method_->substeps(); }
-  void start(const double* outputs) noexcept override;
-  void add(const MeasuredInterval& interval, const double* outputs) noexcept override;
+  void start(Measured outputs) noexcept override;
+  void add(const MeasuredInterval& interval, Measured outputs) noexcept override;
   int most_between() const noexcept override { return method_->most_between(); }
   int reach() const noexcept override { return method_->reach(); }
   int most_reach() const noexcept override { return method_->most_reach(); }
@@ -48,7 +54,7 @@ class RHEC_EXPORT NodeRecorder final : public EstimationMethod {
   std::shared_ptr<const SlipAhead> slip_ahead() const noexcept override { return method_->slip_ahead(); }
 
  private:
-  void append_outputs(const double* outputs);
+  void append_outputs(Measured outputs);
 
   std::unique_ptr<EstimationMethod> method_;
   std::shared_ptr<NodeLog> log_;

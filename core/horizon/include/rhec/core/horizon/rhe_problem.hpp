@@ -30,7 +30,7 @@ struct RobustLoss {
 ///
 ///     minimise  || [chi_0; rho_first] - [xbar; pbar] ||^2_P            arrival cost
 ///             + sum over nodes      || h(chi_i) - y_i ||^2_Ry          missing outputs (NaN) are skipped
-///             + sum between nodes   || h(F(chi_i, nu_i, rho_i; tau)) - y ||^2_Ry
+///             + sum between nodes   || h(F(chi_i, nu_i, rho_i; tau)) - y ||^2_Ry    Ry: times weights of y (Measured)
 ///             + sum over intervals  || nu_i - u_meas_i ||^2_Ru
 ///             + sum over block starts (rho_b - rho_a)^2 / variance     where neighbouring blocks are linked
 ///             + sum over blocks       weight rho_b^2                   where their values are expected to be 0
@@ -60,6 +60,11 @@ class RHEC_EXPORT RheProblem final : public HorizonProblem {
   Eigen::VectorXd arrival_mean;         ///< n_x + n_p
   Eigen::MatrixXd arrival_information;  ///< symmetric positive semidefinite
 
+  /// y at a node, with its weights.
+  void set_output(int node, Measured measured) noexcept;
+  Measured measured(int node) const noexcept {
+    return {output(node), has_weights_ ? weights_.data() + at_output(node) : nullptr};
+  }
   /// y at a node (n_y) and measured u on an interval (n_u), NaN where missing.
   double* output(int node) noexcept { return outputs_.data() + at_output(node); }
   double* measured_input(int interval) noexcept { return measured_inputs_.data() + at_input(interval); }
@@ -69,9 +74,7 @@ class RHEC_EXPORT RheProblem final : public HorizonProblem {
   BetweenNodes& between(int interval) noexcept { return between_[interval]; }
   const BetweenNodes& between(int interval) const noexcept { return between_[interval]; }
   /// Weight of an output from now on.
-  void set_output_weight(int output, double weight) noexcept {
-    setup_.output_weights[output] = output_weights_[output] = weight;
-  }
+  void set_output_weight(int output, double weight) noexcept;
   void set_intervals(int intervals) noexcept { changing_structure().set_intervals(intervals); }
   /// Marks where a parameter's blocks start. `begins` has one entry per interval. The first interval uses the value of
   /// node 0, so begins[0] matters only for a ramp that starts there. Ignored for a parameter that was set up as one
@@ -101,7 +104,8 @@ class RHEC_EXPORT RheProblem final : public HorizonProblem {
   /// Weights in (0, 1] that the robust losses give to the outputs at an iterate: d loss / d s.
   void robust_weights(const Iterate& iterate, int node, double* weights, std::span<double> scratch) const noexcept;
 
-  /// The same for the measurements between the nodes of an interval: `weights` has a row of n_y for each. And, if not
+  /// Of the measurements between the nodes of an interval: the products of these weights and of those that they were
+  /// measured with; `weights` has a row of n_y for each. And, if not
   /// null, rows of the residual h - y and its gradient by the model's [x; p; u (; p at the end)], for each output.
   void linearise_between(int interval, const Iterate& iterate, double* weights, double* rows,
                          std::span<double> scratch) const noexcept;
@@ -131,7 +135,13 @@ class RHEC_EXPORT RheProblem final : public HorizonProblem {
   std::size_t cost_scratch_size() const noexcept override;
 
   void residual(const double* measured, const double* predicted, double* difference) const noexcept;
-  double losses(const double* difference, double* weight, double* curvature) const noexcept;
+  double losses(const double* difference, const double* output_weights, double* weight,
+                double* curvature) const noexcept;
+  const double* weights_at(int node) const noexcept {
+    return has_weights_ ? node_weights_.data() + at_output(node) : output_weights_.data();
+  }
+  const double* weights_between(int interval, int place, double* room) const noexcept;
+  void weigh_nodes() noexcept;
   struct Observed {
     const double *outputs, *jacobians;  ///< rows of the nodes of a range
   };
@@ -168,7 +178,7 @@ class RHEC_EXPORT RheProblem final : public HorizonProblem {
   void add_curvature_of_dynamics(BetweenBatch& batch, const CostView& view) const noexcept;
   void add_curvature_between(BetweenBatch& batch, int i, const CostView& view) const noexcept;
   void add_curvature_of_losses(BetweenBatch& batch, const CostView& view) const noexcept;
-  double weigh(const double* measured, const double* predicted, double* difference, double* weights, double* pulls,
+  double weigh(BetweenBatch& batch, int interval, int place, const double* predicted, double* weights, double* pulls,
                double* curvatures) const noexcept;
   std::ptrdiff_t between_key_size() const noexcept, between_said_size() const noexcept;
   std::ptrdiff_t between_kept_size() const noexcept;
@@ -193,6 +203,8 @@ class RHEC_EXPORT RheProblem final : public HorizonProblem {
   std::vector<double> between_points_;                         ///< shares of an interval (PointSums)
   AlignedDoubles outputs_;                                     ///< one row per node, NaN where nothing was measured
   AlignedDoubles output_weights_, output_periods_, output_inverse_periods_;  ///< rows; the period of angles, else 0
+  bool has_weights_ = false;               ///< some measurement at a node has weights of its own
+  AlignedDoubles weights_, node_weights_;  ///< one row per node: these, and their products with `output_weights_`
   AlignedDoubles measured_inputs_, input_weights_;  ///< rows as in Iterate; NaN and 0 outside of the inputs
   std::vector<double> link_information_, block_weights_;
 };

@@ -46,7 +46,9 @@ struct MeasurementView {
   int vehicle_states, output_count, input_count;
   const double *outputs, *inputs;       ///< rows for all nodes and intervals
   const double *predicted, *jacobians;  ///< for the nodes of the range; rows of Jacobians are padded
-  const double *output_weights, *input_weights;
+  const double* output_weights;         ///< of the first node of the range
+  long output_weights_step;             ///< to those of the next one: 0, or a row
+  const double* input_weights;
   const double *periods, *inverse_periods;  ///< one row each: 2 pi and its inverse for an angle, else 0
   const double* values;                     ///< rows of the iterate
   double* room;                             ///< for two rows of outputs

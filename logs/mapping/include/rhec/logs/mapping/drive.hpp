@@ -16,7 +16,8 @@ struct DriveEvent {
   double arrival = 0.0;  ///< when it was known [s since the start]
   double time = 0.0;     ///< when it was measured; of inputs, from when on they held [s since the start]
   bool is_output = false;
-  std::size_t values = 0;  ///< where its values begin: n_y or n_u, NaN where missing
+  std::size_t values = 0;   ///< where its values begin: n_y or n_u, NaN where missing
+  bool has_sigmas = false;  ///< n_y stated standard deviations follow these, NaN where there is none
 };
 
 /// A drive: what a robot's sensors and drives said, in the order in which it became known.
@@ -29,6 +30,10 @@ struct RHEC_EXPORT Drive {
   std::optional<GeodeticPoint> origin;  ///< of the local plane, if there is one
   std::optional<Damage> damage;         ///< why the log was not read to its end
   const double* values_of(const DriveEvent& event) const noexcept { return values.data() + event.values; }
+  /// Null: it states none.
+  const double* sigmas_of(const DriveEvent& event) const noexcept {
+    return event.has_sigmas ? values_of(event) + outputs : nullptr;
+  }
   Stamp stamp_of(double time) const noexcept;
 };
 

@@ -36,7 +36,8 @@ struct SignalOptions {
   double delay = 0.0;
   bool derivative = false;
   std::string clock;
-  Settings when;
+  Settings when, sigma, variance;
+  double sigma_scale = 1.0, least_sigma = 0.0;
   RHEC_EXPORT static const OptionTable<SignalOptions>& table();
 };
 
@@ -45,6 +46,12 @@ struct SignalCondition {
   SignalName of;
   double at_least, at_most;
   bool holds(double value) const noexcept { return value >= at_least && value <= at_most; }
+};
+
+/// How accurate a record says that its value is.
+struct StatedAccuracy {
+  SignalName of;
+  bool is_variance = false;  ///< else a standard deviation
 };
 
 /// The section `signals`.
@@ -64,8 +71,10 @@ struct MappedSignal {
   SignalOptions options = {};
   std::vector<SignalName> from = {};
   std::vector<SignalCondition> conditions = {};  ///< on fields of the same records
+  std::optional<StatedAccuracy> accuracy = {};   ///< a field of the same records; none: as the scenario says
   double factor = 1.0;                           ///< sign, scale, unit and radius
   bool is_angle = false;                         ///< what is read is one: its differences are taken on the circle
+  double sigma_factor = 1.0;                     ///< of a stated standard deviation
 };
 
 /// Which signals of a log are a model's outputs and inputs. A variable that the section does not name is the signal of

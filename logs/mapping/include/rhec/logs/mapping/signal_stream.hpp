@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <map>
 #include <memory>
 #include <optional>
@@ -20,6 +21,8 @@ struct SignalCount {
   bool is_output = false;
   std::int64_t values = 0, missing = 0;
   std::int64_t left_out = 0;  ///< by a condition (`when`)
+  std::int64_t stated = 0;    ///< values of whose accuracy their records say something
+  double least_sigma = std::numeric_limits<double>::infinity(), most_sigma = 0.0;  ///< that they state
 };
 
 /// Outputs or inputs that were measured together.
@@ -27,6 +30,7 @@ struct SignalRow {
   bool is_output = false;
   Stamp stamp = no_stamp;
   std::vector<double> values;  ///< n_y or n_u, NaN where missing
+  std::vector<double> sigmas;  ///< n_y, stated standard deviations of outputs, NaN: none; empty: of none
 };
 
 /// Outputs and inputs out of records, one record after the other, as a map says.
@@ -71,6 +75,7 @@ class RHEC_EXPORT SignalStream {
   void read(const Record& record, Reading& reading);
   void complete(Channel& channel, Stamp stamp);
   void put(Channel& channel, Stamp stamp, double value);
+  void note_accuracy(const Log& log, const MappedSignal& signal, const std::string& type);
 
   std::size_t outputs_, inputs_;
   std::vector<Channel> channels_;
@@ -78,7 +83,7 @@ class RHEC_EXPORT SignalStream {
   std::vector<bool> wanted_;
   std::int64_t missing_ = 0, left_out_ = 0;
   std::optional<LocalPlane> plane_;
-  std::map<std::pair<bool, Stamp>, std::vector<double>> values_;  ///< of the reading at hand: by kind and stamp
+  std::map<std::pair<bool, Stamp>, SignalRow> completed_;  ///< of the reading at hand: by kind and stamp
   std::vector<SignalRow> rows_;
 };
 

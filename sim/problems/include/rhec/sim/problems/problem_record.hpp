@@ -17,7 +17,7 @@
 namespace rhec::sim {
 
 /// The newest version of the format of problem files; a line without `version` is of version 1.
-constexpr int problem_format_version = 4;
+constexpr int problem_format_version = 5;
 
 /// One line of a problem file: a problem with every number that a solver needs, as JSON. Values are stored by name and
 /// resolved later with the model. docs/problem_format.md describes the keys.
@@ -68,6 +68,10 @@ struct ProblemRecord {
   /// By parameter that is a process (ProcessModel): its number of states. Then arrival, weights and bounds are those of
   /// [x; z] and [u; w], and `data` has the processes of each interval (N rows).
   std::map<std::string, int> processes;
+  /// Since version 5: how much single measurements count, relative to `output_weights` (Measured): as `outputs`, and as
+  /// `between` without the times; none: 1.
+  Rows relative_weights;
+  std::vector<Rows> relative_weights_between;
   /// Since version 4: the states with process noise (StateNoiseModel), in the model's order. Then `inputs` and their
   /// weights are about [u; xi] or [u; xi; w].
   std::vector<std::string> state_noise;
