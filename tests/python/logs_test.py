@@ -253,6 +253,33 @@ def test_a_receiver_with_two_grades_is_two_sensors():
         assert errors[way] < 0.8 * min(errors["good"], errors["middling"], errors["good alone"])
 
 
+def of_claims(seed):
+    """A drive whose receiver states how accurate each fix is, in the median 0.1 m, changing smoothly by factors of ten; by how much
+    the position is wrong on average with one noise for all fixes, and with what it states, right or wrong by one factor for all."""
+    run, noise = rhec.run(ROOT / "scenarios" / "figure8.yaml", set={"speed": 4, "seed": seed, "path.laps": 1}), numpy.random.default_rng(seed)
+    steps, rows = run.steps, run.steps.rows
+    sigma = 0.1 * numpy.exp(1.2 * numpy.convolve(noise.normal(size=rows + 40), numpy.ones(41) / numpy.sqrt(41.0), "valid")[:rows])
+    log = {"time": steps["time"], "sd": sigma, "u1": steps["u1"], "u2": steps["u2"],
+           "east": steps["true_x_pos"] - 0.4 * numpy.cos(steps["true_beta"]) + sigma * noise.normal(size=rows),
+           "north": steps["true_y_pos"] - 0.4 * numpy.sin(steps["true_beta"]) + sigma * noise.normal(size=rows),
+           "delta": steps["true_delta"] + 0.01 * noise.normal(size=rows)}
+
+    def error(one_for_all=0.1, **stated):
+        fixes = {name: {"from": column, **stated} for name, column in (("x_gps", "east"), ("y_gps", "north"))}
+        set = {"signals.outputs": {"delta": "delta", **fixes}, "noise.outputs.x_gps": one_for_all, "noise.outputs.y_gps": one_for_all}
+        table = rhec.estimate(ROOT / "scenarios" / "figure8.yaml", log, set=set, hold_out=0).estimates
+        return numpy.hypot(*(table[name] - steps[f"true_{name}"][:table.rows] for name in ("x_pos", "y_pos")))[20:].mean()
+
+    return {"0.1 m": error(), "0.3 m": error(0.3), "right": error(sigma="sd"),
+            "too small": error(sigma="sd", sigma_scale=1.0 / 3.0), "too large": error(sigma="sd", sigma_scale=3.0)}
+
+
+def test_fixes_count_by_the_accuracy_that_they_state():
+    errors = of_claims(8)
+    for way in ("right", "too small", "too large"):
+        assert errors[way] < 0.85 * min(errors["0.1 m"], errors["0.3 m"]), way
+
+
 def test_what_is_in_a_log(driven, tmp_path):
     file = tmp_path / "drive.mcap"
     rhec.run(ROBOT, set=SHORT, log=file)
