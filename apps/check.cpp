@@ -18,7 +18,6 @@
 #include "rhec/plugins/yaml/yaml.hpp"
 #include "rhec/sim/check/model_check.hpp"
 #include "rhec/sim/check/term_check.hpp"
-#include "rhec/sim/files/json.hpp"
 #include "rhec/sim/loop/scenario.hpp"
 #include "rhec/sim/world/truth_estimator.hpp"
 
@@ -235,10 +234,7 @@ int check(const CheckArguments& arguments) {
   const sim::ModelCheck found = sim::check_model(host, robot, options);
   const std::vector<sim::TermCheck> terms = check_terms(host, arguments, robot_options.controller, robot);
   if (arguments.json) {
-    sim::Json all = sim::Json::parse(sim::check_json(found));
-    all["terms"] = sim::Json::array();
-    for (const sim::TermCheck& term : terms) all["terms"].push_back(sim::Json::parse(sim::check_json(term)));
-    fmt::print("{}\n", all.dump(2));
+    fmt::print("{}\n", sim::check_json(found, terms));
   } else {
     print_findings(found.findings);
     print_drives(found);

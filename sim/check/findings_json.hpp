@@ -11,6 +11,9 @@ namespace rhec::sim {
 
 inline Json number_or_null(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
+struct ModelCheck;
+Json json_of(const ModelCheck& check);
+
 inline Json json_of(const Finding& finding) {
   Json json;
   json["check"] = finding.check;

@@ -26,7 +26,7 @@ Json json_of(const DriveInformation& drive, const ModelCheck& check) {
 
 }  // namespace
 
-std::string check_json(const ModelCheck& check) {
+Json json_of(const ModelCheck& check) {
   Json json;
   json["model"] = check.model;
   json["seed"] = check.seed;
@@ -43,7 +43,9 @@ std::string check_json(const ModelCheck& check) {
                                {"jacobians", json_of(times.jacobians)},
                                {"hessians", json_of(times.hessians)},
                                {"outputs", json_of(times.outputs)}});
-  return json.dump(2);
+  return json;
 }
+
+std::string check_json(const ModelCheck& check) { return json_of(check).dump(2); }
 
 }  // namespace rhec::sim

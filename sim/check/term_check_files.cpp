@@ -3,7 +3,9 @@
 
 namespace rhec::sim {
 
-std::string check_json(const TermCheck& check) {
+namespace {
+
+Json json_of(const TermCheck& check) {
   Json json;
   json["term"] = check.term;
   json["seed"] = check.seed;
@@ -20,6 +22,17 @@ std::string check_json(const TermCheck& check) {
                                  {{"values", json_of(each.values)},
                                   {"jacobians", json_of(each.jacobians)},
                                   {"hessians", json_of(each.hessians)}}}});
+  return json;
+}
+
+}  // namespace
+
+std::string check_json(const TermCheck& check) { return json_of(check).dump(2); }
+
+std::string check_json(const ModelCheck& model, const std::vector<TermCheck>& terms) {
+  Json json = json_of(model);
+  json["terms"] = Json::array();
+  for (const TermCheck& term : terms) json["terms"].push_back(json_of(term));
   return json.dump(2);
 }
 

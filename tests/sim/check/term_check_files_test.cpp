@@ -1,6 +1,7 @@
 // The check of a term as JSON.
 #include <gmock/gmock.h>
 
+#include "rhec/sim/check/model_check.hpp"
 #include "rhec/sim/files/json.hpp"
 #include "sim/support/written_term.hpp"
 
@@ -24,6 +25,12 @@ TEST(TermCheckFiles, HaveAllOfIt) {
   EXPECT_EQ(json["vehicles"][0]["data"], 3);
   EXPECT_EQ(json["vehicles"][0]["time_ns"]["values"]["p99"], 2.0);
   EXPECT_TRUE(json["vehicles"][0]["time_ns"]["hessians"]["median"].is_null());
+  ModelCheck model;
+  model.model = "cart";
+  const Json both = Json::parse(check_json(model, {check, check}));
+  EXPECT_EQ(both["model"], "cart");
+  ASSERT_EQ(both["terms"].size(), 2u);
+  EXPECT_EQ(both["terms"][1], json);
 }
 
 }  // namespace term_check_files_test

@@ -19,6 +19,8 @@
 /// Checks of a new term, limits and costs of a controller's problem, before its first run; docs/check.md explains each.
 namespace rhec::sim {
 
+struct ModelCheck;
+
 /// What a term says of itself.
 struct TermDescription {
   std::string name, meaning;       ///< of its manifest; an empty meaning is missing
@@ -77,5 +79,7 @@ RHEC_EXPORT TermGraph graph_of_term(const Host& host, const Settings& section, c
 
 /// As a JSON object; non-finite numbers become null.
 RHEC_EXPORT std::string check_json(const TermCheck& check);
+/// That of a scenario's model, with those of its controller's terms in a list `terms`.
+RHEC_EXPORT std::string check_json(const ModelCheck& model, const std::vector<TermCheck>& terms);
 
 }  // namespace rhec::sim
