@@ -5,12 +5,14 @@
 #include <pybind11/stl.h>
 
 #include <cmath>
+#include <optional>
 #include <string>
 
 #include "arrays.hpp"
 #include "binding.hpp"
 #include "hosts.hpp"
 #include "rhec/core/base/error.hpp"
+#include "rhec/core/model/motion_outputs.hpp"
 #include "rhec/core/model/vehicle_graph.hpp"
 #include "rhec/core/term/term_functions.hpp"
 #include "rhec/plugins/equations/equation_term.hpp"
@@ -65,12 +67,30 @@ py::array rates(const Vehicle& self, const Numbers& states, const Numbers& input
   return copy(made.data(), rows.shape(width));
 }
 
-py::array observe(const Vehicle& self, const Numbers& states) {
+/// Outputs of motion, such as a gyro's, depend on the inputs and the parameters, too.
+py::array observe(const Vehicle& self, const Numbers& states, const std::optional<Numbers>& inputs,
+                  const std::optional<Numbers>& parameters) {
+  const MotionOutputs motion(*self.model);
+  if (motion.count() > 0 && (!inputs || !parameters))
+    throw Error(fmt::format("inputs and parameters: {} measures motion, which depends on them; expected both",
+                            self.about.outputs[static_cast<std::size_t>(motion.which().front())].name));
   Rows rows;
   rows.add(states, self.about.states, "states");
+  if (inputs) rows.add(*inputs, self.about.inputs, "inputs");
+  if (parameters) rows.add(*parameters, self.about.parameters, "parameters");
   const py::ssize_t width = self.model->output_count();
-  std::vector<double> made(static_cast<std::size_t>(rows.count() * width));
-  self.model->observe({.count = static_cast<int>(rows.count()), .states = states.data(), .outputs = made.data()});
+  std::vector<double> made(static_cast<std::size_t>(rows.count() * width)), moved(motion.which().size());
+  for (py::ssize_t i = 0; i < rows.count(); ++i) {
+    double* const outputs = made.data() + i * width;
+    self.model->observe({.count = 1, .states = rows.row(0, i), .outputs = outputs});
+    if (motion.count() == 0) continue;
+    motion.evaluate({.count = 1,
+                     .states = rows.row(0, i),
+                     .inputs = rows.row(1, i),
+                     .parameters = rows.row(2, i),
+                     .outputs = moved.data()});
+    for (std::size_t k = 0; k < moved.size(); ++k) outputs[motion.which()[k]] = moved[k];
+  }
   return copy(made.data(), rows.shape(width));
 }
 
@@ -232,7 +252,8 @@ void bind_models(py::module_& module) {
           "what it can be evaluated by on this machine; the last one is used")
       .def("rates", &rates, py::arg("states"), py::arg("inputs"), py::arg("parameters"),
            "dx/dt, (n_x) or (n, n_x) [units of the states / s], of vectors or of rows of them.")
-      .def("observe", &observe, py::arg("states"), "y = h(x), (n_y) or (n, n_y).")
+      .def("observe", &observe, py::arg("states"), py::arg("inputs") = py::none(), py::arg("parameters") = py::none(),
+           "y = h(x), or h(x, u, p) where outputs measure motion, as a gyro's do: (n_y) or (n, n_y).")
       .def(
           "integrate", &integrate, py::arg("states"), py::arg("inputs"), py::arg("parameters"), py::arg("duration"),
           py::arg("substeps") = 1, py::arg("with_jacobian") = false,

@@ -277,6 +277,21 @@ def test_shapes_that_are_refused_are_named_with_units():
         assert str(caught.value).startswith(words)
 
 
+def test_outputs_of_motion_are_observed_with_what_moves():
+    """A gyro's rate is that at which the heading turns; without input and slip it is no 0."""
+    vehicle = rhec.Robot({"model": {"name": "bicycle_slip", "outputs": ["x_gps", "heading", "yaw_rate"]}}).vehicle
+    state, inputs, slip = numpy.array([1.0, 2.0, 0.3, 0.2]), [3.0, 0.1], [0.7, 0.9]
+    turning = vehicle.observe(state, inputs, slip)
+    assert turning[2] == pytest.approx(vehicle.rates(state, inputs, slip)[2], rel=1e-12) and turning[2] > 0.1
+    rows = vehicle.observe(numpy.array([state, 2.0 * state]), inputs, [slip, slip])
+    numpy.testing.assert_array_equal(rows[0], turning)
+    assert rows.shape == (2, 3)
+    with pytest.raises(rhec.Error, match="inputs and parameters: yaw_rate measures motion"):
+        vehicle.observe(state)
+    with pytest.raises(rhec.Error, match="inputs: found an array of 3, expected 2"):
+        vehicle.observe(state, [1, 2, 3], slip)
+
+
 def test_no_rows_are_no_rows():
     """There is nothing to read of them."""
     vehicle = rhec.Robot(ROBOT).vehicle
