@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "rhec/core/base/with_size.hpp"
+#include "rhec/core/estimation/measurement.hpp"
 #include "rhec/core/qp/small_matrix.hpp"
 
 namespace rhec {
@@ -263,7 +264,7 @@ void ArrivalCost::smooth_first_interval(const RheProblem& problem, const Iterate
     const double measured = problem.measured_input(0)[j];
     const bool missing = std::isnan(measured);
     const double sigma =
-        missing ? 100.0 * model.description().inputs[j].scale : std::sqrt(filter_.noise().input_variances[j]);
+        missing ? unknown_sigma(model.description().inputs[j]) : std::sqrt(filter_.noise().input_variances[j]);
     rows_(row, nx + j) = 1.0 / sigma;
     right[row] = missing ? 0.0 : (measured - inputs_[j]) / sigma;
   }

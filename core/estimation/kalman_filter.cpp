@@ -9,6 +9,7 @@
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/base/padded.hpp"
 #include "rhec/core/base/with_size.hpp"
+#include "rhec/core/estimation/measurement.hpp"
 #include "rhec/core/horizon/rhe_problem.hpp"
 
 namespace rhec {
@@ -186,7 +187,7 @@ void KalmanFilter::make_symmetric() noexcept {
 }
 
 double KalmanFilter::input_variance(int input, const double* measured) const noexcept {
-  const double wide = 100.0 * model_->description().inputs[input].scale;
+  const double wide = unknown_sigma(model_->description().inputs[input]);
   return std::isnan(measured[input]) ? wide * wide : noise_.input_variances[input];
 }
 

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "rhec/core/base/error.hpp"
+#include "rhec/core/estimation/measurement.hpp"
 
 namespace rhec {
 namespace {
@@ -119,7 +120,7 @@ void PlaceSmoother::step_back(BankHistory& history, SlipMap& map) noexcept {
   for (int j = 0; j < inputs_; ++j) {
     double variance = 1.0;  // of a process's noise
     if (j < nu_) {
-      const double wide = 100.0 * vehicle_->description().inputs[j].scale;
+      const double wide = unknown_sigma(vehicle_->description().inputs[j]);
       variance = std::isnan(after.inputs[j]) ? wide * wide : setup_.input_variances[j];
     }
     for (int c = 0; c < n_; ++c)

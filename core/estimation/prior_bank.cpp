@@ -13,6 +13,7 @@
 
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/estimation/kalman_filter.hpp"
+#include "rhec/core/estimation/measurement.hpp"
 #include "rhec/core/kernels/bank_kernels.hpp"
 #include "rhec/core/kernels/kernel_sets.hpp"
 #include "rhec/core/model/motion_outputs.hpp"
@@ -26,6 +27,8 @@ constexpr int lanes_at_once = 8;
 constexpr int outputs_at_once = 8;
 /// Below this probability a member's weight does not fall, so that it can come back.
 constexpr double least_weight = 1e-10;
+/// So many times the range of its bounds a state or a parameter of a member may be beyond them.
+constexpr double far_beyond = 3.0;
 
 /// Fills up the states of one prior to those of all priors of its parameter, so that a state has one meaning for all
 /// members that are mixed. Where a prior has no mean, its mean is the parameter; where it has no derivatives, these are
@@ -135,6 +138,14 @@ PriorBank::PriorBank(std::shared_ptr<const Model> model, Setup setup)
     n_ += process.count;
     processes_.push_back(std::move(process));
   }
+  const auto limit = [this](int entry, const Variable& about) {
+    const double room = far_beyond * (about.upper - about.lower);
+    if (!std::isfinite(room)) return;
+    limited_.push_back(entry);
+    limits_.insert(limits_.end(), {about.lower - room, about.upper + room});
+  };
+  for (int j = 0; j < nx_; ++j) limit(j, model_->description().states[j]);
+  for (int j = 0; j < np_; ++j) limit(processes_[j].first, model_->description().parameters[j]);
   const auto n = static_cast<std::size_t>(n_), M = static_cast<std::size_t>(lanes_), nx = static_cast<std::size_t>(nx_);
   const std::size_t columns = nx + nu_ + 2 * np_;
   mean_.assign(n * M, 0.0);
@@ -143,7 +154,7 @@ PriorBank::PriorBank(std::shared_ptr<const Model> model, Setup setup)
   for (auto* v : {&weights_, &log_likelihoods_, &keep_, &take_, &squares_}) v->assign(M, 0.0);
   innovation_variances_.assign(ny_ * M, 0.0);
   output_variances_.assign(ny_ * M, 0.0);
-  stated_weights_.assign(ny_, 1.0);
+  stated_weights_.reserve(ny_);
   learnt_.assign(2 * static_cast<std::size_t>(ny_), 0.0);
   const std::vector<Variable>& outputs = model_->description().outputs;
   for (int j = 0; j < ny_; ++j) {
@@ -322,9 +333,8 @@ void PriorBank::update(Measured y, const double* robust_weights) noexcept {
               .is_between = false,
               .weights = y.weights};
   std::ranges::fill(added_, 0.0);
-  is_weighed_ = y.weights != nullptr;
-  if (is_weighed_) std::copy_n(y.weights, ny_, stated_weights_.begin());
-  if (ahead_ || is_weighed_) spread_variances(y.weights);
+  stated_weights_.assign(y.weights, y.weights ? y.weights + ny_ : nullptr);
+  if (ahead_ || y.weights) spread_variances(y.weights);
   if (ahead_ && std::ranges::any_of(ahead_->curved_outputs, [y](int j) { return !std::isnan(y[j]); })) {
     linearise_given(y.values);
     wide_before_ = wide_mean_;
@@ -333,7 +343,18 @@ void PriorBank::update(Measured y, const double* robust_weights) noexcept {
     frame.before_lane = 1;
   }
   log_likelihood_ = take_outputs(frame, y.values, robust_weights);
-  if (is_weighed_ && setup_.robust.empty()) spread_variances();
+  if (y.weights && setup_.robust.empty()) spread_variances();
+  keep_near_bounds();
+}
+
+/// A member that has followed a measurement which was wrong by far, as they may be while the vehicle is lost, is
+/// nowhere near where it was linearised; what it makes of the next one would lead still farther away.
+void PriorBank::keep_near_bounds() noexcept {
+  for (std::size_t k = 0; k < limited_.size(); ++k) {
+    double* const values = mean_.data() + static_cast<std::ptrdiff_t>(limited_[k]) * lanes_;
+    const double lower = limits_[2 * k], upper = limits_[2 * k + 1];
+    for (int m = 0; m < lanes_; ++m) values[m] = std::min(std::max(values[m], lower), upper);
+  }
 }
 
 /// Outputs and gradients at `states_`.
@@ -465,13 +486,14 @@ void PriorBank::mix_members() noexcept {
 void PriorBank::predict(const double* measured_input, double duration) noexcept {
   begin_step(measured_input, duration);
   take_step(duration);
+  keep_near_bounds();
 }
 
 /// All that an interval asks for before the members move: inputs, ground, processes, and another law.
 void PriorBank::begin_step(const double* measured_input, double duration) noexcept {
   for (int j = 0; j < nu_; ++j) {
     const bool missing = std::isnan(measured_input[j]);
-    const double wide = 100.0 * model_->description().inputs[j].scale;
+    const double wide = unknown_sigma(model_->description().inputs[j]);
     input_[j] = missing ? 0.0 : measured_input[j];
     variances_[j] = missing ? wide * wide : setup_.input_variances[j];
   }

@@ -45,6 +45,7 @@ void PriorBank::predict(const MeasuredInterval& measured, Measured end_outputs) 
   } else {
     take_step_from_point();
   }
+  keep_near_bounds();
 }
 
 int PriorBank::wide_count() const noexcept {

@@ -126,7 +126,8 @@ int PriorBank::most_probable() const noexcept {
 
 double PriorBank::robust_weight(int output) const noexcept {
   // Noise that adapts has been spread anew since.
-  const double stated = is_weighed_ && !setup_.robust.empty() && !setup_.adapts_noise ? stated_weights_[output] : 1.0;
+  const bool is_weighed = !stated_weights_.empty() && !setup_.robust.empty() && !setup_.adapts_noise;
+  const double stated = is_weighed ? stated_weights_[output] : 1.0;
   return (learnt_[output] / stated + added_[output]) /
          output_variances_[static_cast<std::ptrdiff_t>(output) * lanes_ + most_probable()];
 }

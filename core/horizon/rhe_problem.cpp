@@ -106,6 +106,26 @@ RheProblem::RheProblem(std::shared_ptr<const Model> model, Setup setup)
   arrival_information = Eigen::MatrixXd::Zero(nx() + np(), nx() + np());
 }
 
+double RheProblem::link_variance(int interval, int parameter) const noexcept {
+  return 1.0 / link_information_[interval * np() + parameter];
+}
+
+void RheProblem::set_block_weight(int interval, int parameter, double weight) noexcept {
+  block_weights_[interval * np() + parameter] = weight;
+}
+
+double RheProblem::block_weight(int interval, int parameter) const noexcept {
+  return block_weights_[interval * np() + parameter];
+}
+
+Measured RheProblem::measured(int node) const noexcept {
+  return {output(node), has_weights_ ? weights_.data() + at_output(node) : nullptr};
+}
+
+const double* RheProblem::weights_at(int node) const noexcept {
+  return has_weights_ ? node_weights_.data() + at_output(node) : output_weights_.data();
+}
+
 void RheProblem::set_output(int node, Measured measured) noexcept {
   std::copy_n(measured.values, ny_, output(node));
   if (!measured.weights && !has_weights_) return;

@@ -21,8 +21,8 @@ struct Turntable {
   }
 };
 
-/// States: psi, the gyro's scale error if it has one, and its value at the node.
-inline std::shared_ptr<const Model> turntable(bool has_scale_error = false) {
+/// States: psi, the gyro's scale error if it has one, and its value at the node. `traction`: its bounds.
+inline std::shared_ptr<const Model> turntable(bool has_scale_error = false, const Variable& traction = {}) {
   ModelDescription about;
   about.states.resize(1);
   about.inputs.resize(1);
@@ -30,6 +30,7 @@ inline std::shared_ptr<const Model> turntable(bool has_scale_error = false) {
   about.outputs.resize(2);
   about.states[0].name = "psi";
   about.inputs[0].name = "omega";
+  about.parameters[0] = traction;
   about.parameters[0].name = "kappa";
   about.outputs[0].name = "angle";
   about.outputs[1].name = "gyro";

@@ -9,6 +9,7 @@
 #include <random>
 #include <vector>
 
+#include "rhec/core/estimation/measurement.hpp"
 #include "support/cart.hpp"
 #include "support/linear_case.hpp"
 #include "support/turntable.hpp"
@@ -101,6 +102,17 @@ TEST(KalmanFilter, GuessesAnInputThatIsMissingAndTrustsItLittle) {
   with.predict(&measured, &guess, 0.2);
   EXPECT_LT(largest(without.mean - with.mean), 1e-12);
   EXPECT_GT(without.covariance(1, 1), with.covariance(1, 1) + 100.0);
+}
+
+/// Half of its range, where it is bounded closely.
+TEST(KalmanFilter, KnowsOfAnInputThatIsMissingThatItIsWithinItsBounds) {
+  Variable speed;
+  speed.scale = 2.0;
+  EXPECT_EQ(unknown_sigma(speed), 200.0);
+  speed.lower = -1.0;
+  EXPECT_EQ(unknown_sigma(speed), 200.0);
+  speed.upper = 5.0;
+  EXPECT_EQ(unknown_sigma(speed), 3.0);
 }
 
 TEST(KalmanFilter, CarriesDeviationsAsItMovesTheMean) {

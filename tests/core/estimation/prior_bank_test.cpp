@@ -488,6 +488,30 @@ TEST(PriorBank, DoesNotLearnTractionFromATurntableThatRests) {
   }
 }
 
+/// What no vehicle can do, measured again and again, leads no member to where nothing is finite.
+TEST(PriorBank, StaysNearTheBoundsOfItsParameters) {
+  const TurntableNoise noise{.angle = 0.01, .gyro = 0.01};
+  Variable traction;
+  traction.lower = 0.0;
+  traction.upper = 1.0;
+  const auto model = turntable(false, traction);
+  PriorBank bank(model, of_two_laws(noise, "{sigma: 0.01, along: time, course: ramp, mean: 0.8, mean_sigma: 0.3}",
+                                    "{sigma: 0.5, along: time, course: ramp, mean: 0.8, mean_sigma: 0.3}"));
+  const Eigen::Index nx = model->state_count();
+  bank.reset(Eigen::VectorXd::Zero(nx), Eigen::MatrixXd::Identity(nx, nx) * 1e-4);
+  Eigen::VectorXd mean;
+  Eigen::MatrixXd covariance;
+  for (int k = 0; k < 30; ++k) {
+    const double omega = 0.5, outputs[] = {k % 2 ? 1e5 : -1e5, k % 3 ? 400.0 : -300.0};
+    bank.predict({0.2, &omega}, outputs);
+    bank.update(outputs);
+    bank.moments(mean, covariance);
+    ASSERT_TRUE(mean.allFinite() && covariance.allFinite()) << k;
+    ASSERT_GE(mean[nx], -3.0) << k;
+    ASSERT_LE(mean[nx], 4.0) << k;
+  }
+}
+
 /// Readings within one interval say the same of a law: with twenty, a law is no more probable than with one.
 TEST(PriorBank, WeighsLawsByOneReadingOfAnInterval) {
   const TurntableNoise noise{.angle = 1.0, .gyro = 0.01, .omega = 1e-4};

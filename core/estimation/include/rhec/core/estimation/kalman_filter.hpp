@@ -39,7 +39,7 @@ class RHEC_EXPORT KalmanFilter {
   /// that y was measured with.
   void update(Measured y, const double* information_weights = nullptr) noexcept;
   /// Time update by `duration` [s] with a measured input (n_u). Where it is missing (NaN), the guess replaces it, with
-  /// a standard deviation of a hundred times the variable's typical magnitude.
+  /// the standard deviation `unknown_sigma`.
   void predict(const double* measured_input, const double* input_guess, double duration) noexcept;
   /// The same if parameters jump or ramp during the interval: variances (n_p, 0 without a jump) of the change.
   void predict(const double* measured_input, const double* input_guess, double duration,

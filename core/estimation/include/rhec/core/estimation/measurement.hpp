@@ -1,7 +1,10 @@
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
+
+#include "rhec/core/model/model.hpp"
 
 namespace rhec {
 
@@ -15,5 +18,11 @@ inline bool is_measurement(double value) noexcept { return std::abs(value) < 1e1
 /// The value, or `missing_value` if it cannot be a measurement. Data are cleaned where they enter: in Estimator, and
 /// for recorded runs in FullInformationEstimation. Behind these a value is finite or NaN.
 inline double cleaned(double value) noexcept { return is_measurement(value) ? value : missing_value; }
+
+/// Standard deviation of an input that was not measured, in its unit: a hundred times its typical magnitude, but no
+/// more than half of the range that it is bounded to.
+inline double unknown_sigma(const Variable& input) noexcept {
+  return std::min(100.0 * input.scale, 0.5 * (input.upper - input.lower));
+}
 
 }  // namespace rhec

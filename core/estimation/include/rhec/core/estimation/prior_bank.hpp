@@ -42,8 +42,8 @@ class RHEC_EXPORT PriorBank {
   /// The weight, above 0 and at most 1, by which the last update scaled an output's information, for the most probable
   /// member; 1 without a robust loss.
   double robust_weight(int output) const noexcept;
-  /// Time update by `duration` [s] with a measured input (n_u, NaN where missing: 0, with a standard deviation of a
-  /// hundred times the variable's typical magnitude).
+  /// Time update by `duration` [s] with a measured input (n_u, NaN where missing: 0, with the standard deviation
+  /// `unknown_sigma`).
   void predict(const double* measured_input, double duration) noexcept;
   /// The same with measurements between the two nodes, each used at its own time. The noise of an input and of a
   /// process is one value over the interval, as a window has it, so that the moments are those of a window.
@@ -138,8 +138,7 @@ class RHEC_EXPORT PriorBank {
   bool move_point(const MeasuredInterval& interval, Measured end_outputs) noexcept;
   void add_curvature(double from_first) noexcept;
   double curvature_factor(int state, int factor, double from_first) const noexcept;
-  void take_step_from_point() noexcept;
-  void linearise_nodes() noexcept;
+  void take_step_from_point() noexcept, linearise_nodes() noexcept;
   void linearise_given(const double* y) noexcept;
   void take_between(const MeasuredInterval& interval, int which, bool about_point) noexcept;
   void narrow() noexcept;
@@ -151,13 +150,12 @@ class RHEC_EXPORT PriorBank {
   void find_loss_scales();
   void weigh_outputs(const Frame& frame, const double* y, int taken, const double* given) noexcept;
   void check_map() const;
-  void follow_map() noexcept;
-  void add_offsets() noexcept;
+  void follow_map() noexcept, add_offsets() noexcept;
   void adapt_noise(const Frame& frame, const double* y) noexcept;
   static double scale_weight(double s, double delta) noexcept;
   double robust_surplus(const double* y, int sensor, int lane) const noexcept;
   int most_probable() const noexcept;
-  void reset_noise() noexcept;
+  void reset_noise() noexcept, keep_near_bounds() noexcept;
   void spread_variances(const double* weights = nullptr) noexcept;
   int own_places(int member, int parameter, int* places) const noexcept;
 
@@ -165,8 +163,7 @@ class RHEC_EXPORT PriorBank {
   Setup setup_;
   int members_, lanes_, nx_, nu_, np_, ny_, n_ = 0;
   std::vector<Process> processes_;
-  std::vector<int> sensor_;   ///< per output: the first output of its sensor
-  std::vector<int> loss_of_;  ///< per output: its robust loss, or -1
+  std::vector<int> sensor_, loss_of_;  ///< per output: the first output of its sensor; its robust loss, or -1
   /// Per robust loss and number of outputs that are not missing: what an output without outliers says of its noise.
   std::vector<std::vector<double>> loss_scales_;
   /// Per output: its noise variance, and the variance of that, relative to its square.
@@ -180,8 +177,9 @@ class RHEC_EXPORT PriorBank {
   /// Per measurement between the nodes, and for the end: outputs as expected at `point_`, and their gradients.
   AlignedDoubles wide_predicted_, wide_gradient_;
   AlignedDoubles point_;                ///< where the interval is linearised
-  bool is_weighed_ = false;             ///< whether the outputs of the last update had weights: these
-  std::vector<double> stated_weights_;  ///< n_y
+  std::vector<int> limited_;            ///< entries of [x; z] with bounds
+  std::vector<double> limits_;          ///< beyond these: lower and upper of each
+  std::vector<double> stated_weights_;  ///< of the outputs of the last update, n_y; empty: all were 1
   std::unique_ptr<LookAhead> ahead_;    ///< null without outputs of motion
   bool is_curved_ = false;              ///< whether the interval has second-order terms
   std::vector<double> added_;           ///< n_y: variances of second-order terms

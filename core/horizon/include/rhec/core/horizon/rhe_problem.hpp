@@ -62,9 +62,7 @@ class RHEC_EXPORT RheProblem final : public HorizonProblem {
 
   /// y at a node, with its weights.
   void set_output(int node, Measured measured) noexcept;
-  Measured measured(int node) const noexcept {
-    return {output(node), has_weights_ ? weights_.data() + at_output(node) : nullptr};
-  }
+  Measured measured(int node) const noexcept;
   /// y at a node (n_y) and measured u on an interval (n_u), NaN where missing.
   double* output(int node) noexcept { return outputs_.data() + at_output(node); }
   double* measured_input(int interval) noexcept { return measured_inputs_.data() + at_input(interval); }
@@ -82,17 +80,11 @@ class RHEC_EXPORT RheProblem final : public HorizonProblem {
   void set_blocks(int parameter, const std::uint8_t* begins, Transition transition) noexcept;
   /// Links the block that starts at an interval to the previous one; infinite variance: not linked.
   void link(int interval, int parameter, double variance) noexcept;
-  double link_variance(int interval, int parameter) const noexcept {
-    return 1.0 / link_information_[interval * np() + parameter];
-  }
+  double link_variance(int interval, int parameter) const noexcept;
   /// Weight of the squared value of the block that starts at an interval; at interval 0, of the horizon's first block,
   /// which has no control of its own. For process noise that is constant over a block (StateNoiseModel).
-  void set_block_weight(int interval, int parameter, double weight) noexcept {
-    block_weights_[interval * np() + parameter] = weight;
-  }
-  double block_weight(int interval, int parameter) const noexcept {
-    return block_weights_[interval * np() + parameter];
-  }
+  void set_block_weight(int interval, int parameter, double weight) noexcept;
+  double block_weight(int interval, int parameter) const noexcept;
   void finish() noexcept;
   /// Copies data, output weights and structure of a problem with the same model and otherwise the same set-up, without
   /// allocation.
@@ -137,11 +129,8 @@ class RHEC_EXPORT RheProblem final : public HorizonProblem {
   void residual(const double* measured, const double* predicted, double* difference) const noexcept;
   double losses(const double* difference, const double* output_weights, double* weight,
                 double* curvature) const noexcept;
-  const double* weights_at(int node) const noexcept {
-    return has_weights_ ? node_weights_.data() + at_output(node) : output_weights_.data();
-  }
+  const double* weights_at(int node) const noexcept;
   const double* weights_between(int interval, int place, double* room) const noexcept;
-  void weigh_nodes() noexcept;
   struct Observed {
     const double *outputs, *jacobians;  ///< rows of the nodes of a range
   };
@@ -184,11 +173,10 @@ class RHEC_EXPORT RheProblem final : public HorizonProblem {
   std::ptrdiff_t between_kept_size() const noexcept;
   double add_known_between(StageRange range, const Iterate& iterate, const CostView& view, BetweenCache& known,
                            double* memory) const noexcept;
-  double* H_of(const CostView& view, int stage) const noexcept;
-  double* h_of(const CostView& view, int stage) const noexcept;
+  double *H_of(const CostView&view, int stage) const noexcept, *h_of(const CostView&view, int stage) const noexcept;
   double inputs(int interval, const Iterate& iterate, double* H, double* h) const noexcept;
   double links(int interval, const Iterate& iterate, double* H, double* h) const noexcept;
-  void write_bounds(int stage) noexcept;
+  void weigh_nodes() noexcept, write_bounds(int stage) noexcept;
   double arrival_term(const Iterate& iterate, double* q) const noexcept;
   double first_block_weight(int parameter) const noexcept;
 
