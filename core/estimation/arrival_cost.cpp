@@ -206,10 +206,9 @@ void ArrivalCost::filter_first_interval(const RheProblem& problem, const Iterate
   if (!problem.setup().robust.empty()) {
     problem.linearise_between(0, solution, between_weights_.data(), nullptr, between_scratch_);
   } else {
-    const int ny = problem.model().output_count();
+    auto weight = between_weights_.begin();
     for (int k = 0; k < between.count(); ++k)
-      for (int j = 0; j < ny; ++j)
-        between_weights_[static_cast<std::size_t>(k * ny + j)] = between.measured(k).weight(j);
+      for (int j = 0; j < between.width(); ++j) *weight++ = between.measured(k).weight(j);
   }
   filter_.predict(between.over(problem.duration(0), problem.measured_input(0)), inputs_.data(),
                   ramp ? ramp_variances_.data() : nullptr, between_weights_.data(), problem.measured(1));

@@ -252,12 +252,12 @@ TEST(TranscriptionKernels, MultiplyRowsAndAddSums) {
   for (int trial = 0; trial < 40; ++trial) {
     const int rows = random.integer(1, 9), inner = random.integer(1, 12), columns = random.integer(1, 20),
               width = padded(columns), c_step = inner + random.integer(0, 3), j_step = width + random.integer(0, 3);
-    AlignedDoubles C = numbers(random, static_cast<std::size_t>(rows * c_step)),
-                   J = numbers(random, static_cast<std::size_t>(inner * j_step + 8)),
-                   W = numbers(random, static_cast<std::size_t>(rows * rows)), v = numbers(random, rows),
-                   H = numbers(random, static_cast<std::size_t>(width * width)), h = numbers(random, width);
+    AlignedDoubles C = numbers(random, static_cast<std::size_t>(rows) * c_step),
+                   J = numbers(random, static_cast<std::size_t>(inner) * j_step + 8),
+                   W = numbers(random, static_cast<std::size_t>(rows) * rows), v = numbers(random, rows),
+                   H = numbers(random, static_cast<std::size_t>(width) * width), h = numbers(random, width);
     for (const KernelSet& set : runnable_kernels()) {
-      AlignedDoubles G(static_cast<std::size_t>(rows * width), 7.0), sum_H = H, sum_h = h;
+      AlignedDoubles G(static_cast<std::size_t>(rows) * width, 7.0), sum_H = H, sum_h = h;
       set.transcription->multiply_rows(C.data(), c_step, J.data(), j_step, {rows, inner, columns}, width, G.data());
       for (int r = 0; r < rows; ++r)
         for (int k = 0; k < width; ++k) {
