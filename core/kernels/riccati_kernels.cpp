@@ -3,6 +3,7 @@
 
 #include "rhec/core/kernels/lane_sums.hpp"
 #include "rhec/core/kernels/lanes.hpp"
+#include "rhec/core/kernels/reflection.hpp"
 
 namespace rhec {
 namespace kernels {
@@ -267,6 +268,31 @@ RHEC_ALWAYS_INLINE inline bool eliminate_pair(const Stage& stage, const Memory<S
   return c > 0.0 && determinant > 0.0 && determinant > tolerance * (a * c);
 }
 
+/// Makes the reduced Hessian of two free controls convex, in X and in the QP's H.
+template <class Stage>
+RHEC_ALWAYS_INLINE inline void reflect_pair(const RiccatiView& view, const Memory<Stage>& at, double tolerance,
+                                            typename Stage::R* X) {
+  constexpr Constant<Stage::most_states> first;
+  constexpr Constant<Stage::most_states + 1> second;
+  const double a = X[first].entry(first), b = X[second].entry(first), c = X[second].entry(second);
+  const double determinant = a * c - b * b;
+  if (c > 0.0 && determinant > 0.0 && determinant > tolerance * (a * c)) return;
+  const auto size = [](double x) RHEC_ALWAYS_INLINE { return x < 0.0 ? -x : x; };
+  const double half = 0.5 * (a - c), largest = size(half) < size(b) ? size(b) : size(half);
+  const double x = half / largest, y = b / largest;
+  const double radius = largest > 0.0 ? largest * __builtin_sqrt(x * x + y * y) : 0.0;
+  const PairMatrix now = reflect({a, b, c}, radius);
+  double* const of_first = view.own_H + (at.H - view.H) + first * at.stride;
+  double* const of_second = of_first + at.stride;
+  of_first[first] += now.first - a;
+  of_first[second] += now.beside - b;
+  of_second[first] += now.beside - b;
+  of_second[second] += now.second - c;
+  X[first] = X[first].with(first, now.first).with(second, now.beside);
+  X[second] = X[second].with(first, now.beside).with(second, now.second);
+  *view.is_reflected = true;
+}
+
 template <class Stage>
 RHEC_ALWAYS_INLINE inline bool factor_stage(const RiccatiView& view, int i, double tolerance) {
   using R = typename Stage::R;
@@ -278,8 +304,10 @@ RHEC_ALWAYS_INLINE inline bool factor_stage(const RiccatiView& view, int i, doub
   stage.each_control([&](auto k) RHEC_ALWAYS_INLINE { any_fixed |= at.sides[k] != 0; });
   view.fixes[i] = any_fixed;
   const auto eliminate = [&]() RHEC_ALWAYS_INLINE {
-    if constexpr (Stage::has_pair)
+    if constexpr (Stage::has_pair) {
+      if (view.own_H && !any_fixed) reflect_pair(view, at, tolerance, X);
       if (!any_fixed) return eliminate_pair(stage, at, tolerance, X);
+    }
     return eliminate_controls(stage, at, any_fixed, tolerance, X);
   };
   if (!eliminate()) return false;
@@ -948,6 +976,32 @@ void combine(const double* batch, const double* weights, double* sums, long coun
   }
 }
 
+/// The weighted sums of `number` batches at once.
+template <int number>
+RHEC_ALWAYS_INLINE inline void combine_few(const double* const* batches, const double* const* weights, double* sums,
+                                           long count) {
+  Batch weight[number];
+  for (int b = 0; b < number; ++b) weight[b] = Batch::from(weights[b]);
+  for (long k = 0; k < count; k += 8) {
+    Lanes of_entry[8];
+    for (int j = 0; j < 8; ++j) {
+      of_entry[j] = Lanes{};
+      for (int b = 0; b < number; ++b) {
+        const Batch entry = Batch::from(batches[b] + (k + j) * response_batch);
+        for (int v = 0; v < response_batch / lane_count; ++v) of_entry[j] += entry.part[v] * weight[b].part[v];
+      }
+    }
+    add_sums_of(of_entry, sums + k);
+  }
+}
+
+// As many at once as there are registers for their weights.
+void combine_batches(const double* const* batches, const double* const* weights, int number, double* sums, long count) {
+  for (; number >= 3; number -= 3, batches += 3, weights += 3) combine_few<3>(batches, weights, sums, count);
+  if (number == 2) combine_few<2>(batches, weights, sums, count);
+  if (number == 1) combine_few<1>(batches, weights, sums, count);
+}
+
 /// The part of a row that holds states.
 template <class Stage>
 using StateRow = Row<Stage::state_registers>;
@@ -1339,6 +1393,7 @@ constinit const RiccatiKernels RHEC_TABLE(riccati_kernels_, RHEC_SET) = {&kernel
                                                                          &kernels::sensitivities_backward,
                                                                          &kernels::sensitivities_forward,
                                                                          &kernels::combine,
+                                                                         &kernels::combine_batches,
                                                                          &kernels::carry_covariance,
                                                                          &kernels::filter_covariance,
                                                                          &kernels::form,

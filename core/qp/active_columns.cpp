@@ -111,20 +111,32 @@ bool DualActiveSet::find_sensitivities_of_next(const StageQp& qp, Riccati& ricca
 void DualActiveSet::add_sensitivities(const Riccati& riccati, const Weights& weights,
                                       std::vector<double>& sums) const noexcept {
   const auto is_zero = [](double weight) { return weight == 0.0; };
-  for (int k = 0; k < batch_count_; ++k)
-    if (batches_[k].count > 0 && !std::all_of(weights[k].begin(), weights[k].end(), is_zero))
+  const double *values[most_batches], *of_batch[most_batches];
+  int number = 0;
+  for (int k = 0; k < batch_count_; ++k) {
+    if (batches_[k].count == 0 || std::all_of(weights[k].begin(), weights[k].end(), is_zero)) continue;
+    if (!has_limits_) {
       riccati.add_values(batches_[k].sensitivities, weights[k].data(), all_places_, sums.data());
+      continue;
+    }
+    values[number] = batches_[k].sensitivities.values.data();
+    of_batch[number++] = weights[k].data();
+  }
+  riccati_kernels().combine_batches(values, of_batch, number, sums.data(), all_places_);
 }
 
 /// Computes the row that a bound would add to the factor below `count` others. Returns the square of its diagonal
 /// entry, or 0 if it depends on them linearly.
 double DualActiveSet::eliminate(int entering, int count, double* row) const noexcept {
-  double left = -sensitivity(entering, entering);
+  const unsigned number = static_cast<unsigned>(number_[entering]);
+  const double* const sensitivities = sensitivities_at(number / batch_size, 0) + number % batch_size;
+  const auto at = [sensitivities](int place) { return sensitivities[static_cast<std::ptrdiff_t>(place) * batch_size]; };
+  double left = -at(entering);
   if (has_limits_ && relaxed_[entering] != 0) left += softness(entering);
   const double least = dependence * left;
   for (int k = 0; k < count; ++k) {
     const double* above = factor_row(k);
-    row[k] = (-sensitivity(entering, columns_[k]) - dot(above, row, k)) * above[k];
+    row[k] = (-at(columns_[k]) - dot(above, row, k)) * above[k];
     left -= row[k] * row[k];
   }
   return left > least && least > 0.0 ? left : 0.0;
@@ -139,8 +151,8 @@ void DualActiveSet::back_substitute(double* x) const noexcept {
   }
 }
 
-/// Changes the multipliers of the columns so that their bounds are met.
-void DualActiveSet::return_to_bounds(const Riccati& riccati) noexcept {
+/// Changes the multipliers of the columns so that their bounds are met. The values do not follow yet.
+void DualActiveSet::return_to_bounds() noexcept {
   double change[max_columns_with_limits];
   const int count = column_count();
   for (int k = 0; k < count; ++k) {
@@ -148,12 +160,18 @@ void DualActiveSet::return_to_bounds(const Riccati& riccati) noexcept {
     change[k] = (value_[columns_[k]] - target(columns_[k], multipliers_[k]) - dot(row, change, k)) * row[k];
   }
   back_substitute(change);
-  Weights weights{};
   for (int k = 0; k < count; ++k) {
     multipliers_[k] += change[k];
-    weight_of(columns_[k], weights) = change[k];
+    weight_of(columns_[k], pending_) = change[k];
   }
-  add_sensitivities(riccati, weights, value_);
+  has_pending_ = true;
+}
+
+/// The values of all places follow what is pending.
+void DualActiveSet::write_pending(const Riccati& riccati) noexcept {
+  add_sensitivities(riccati, pending_, value_);
+  pending_ = {};
+  has_pending_ = false;
 }
 
 /// Computes the Cholesky factor of S from row `first` on, with reciprocals on its diagonal. Linearly dependent columns

@@ -15,7 +15,7 @@ namespace {
 // Weights relative to the largest curvature of the stage.
 constexpr double weights[] = {1e1, 1e3};
 constexpr int most_sets = 4;
-// QPs that are not convex before one is tried again where each has to be cheap.
+// QPs in a row that are not convex before one is tried, and tried again, where each has to be cheap.
 constexpr int most_wait = 16;
 // What the augmentation takes over of the quadratic weight of a slack.
 constexpr double share_of_slack = 0.9;
@@ -109,12 +109,14 @@ void StageQpSolver::shift_multipliers(const StageQp& qp, double relative, Iterat
       });
 }
 
-/// Most augmentations that fail do so because the QP is not convex on its active limits either, and then those of the
-/// next samples fail, too.
+/// An augmentation takes several times as long as a convexification. Where each QP has to be cheap, it is for those
+/// that stay not convex: where something passes by, rows come and go, few augmentations fit, and none for long.
 bool StageQpSolver::may_augment() noexcept {
-  if (!is_cheap_ || has_fitted_) return true;
-  if (wait_ > 0) --wait_;
-  return not_convex_ > 1 && wait_ == 0;
+  if (!is_cheap_) return true;
+  if (not_convex_ == 1) has_fitted_ = false;
+  if (has_fitted_) return true;
+  if (not_convex_ == 1 || wait_ <= 0) wait_ = most_wait + 1;
+  return --wait_ == 0;
 }
 
 /// Solves a QP that is not convex but for its active limits; false if it is not convex on them either, or no active set

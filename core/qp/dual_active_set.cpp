@@ -34,6 +34,8 @@ constexpr int max_refinements = 4, max_combined = 2;
 constexpr int max_refinements_with_limits = 8, refinements_before_holding = 3;
 // A miss of which a refinement leaves more than this share is rounding.
 constexpr double less = 0.5;
+// Where each QP has to be cheap, a miss that is corrected by sensitivities alone.
+constexpr double small_miss = 100.0;
 // With limits, what refinement may leave of the misses: where rounding prevents more, the interior-point method gets no
 // further either, and takes a hundred times as long.
 constexpr double rounding = 10.0;
@@ -349,16 +351,17 @@ void DualActiveSet::release_column(int k, Weights& weights) noexcept {
 }
 
 /// Corrects the column that is most wrong, and the multipliers of the others, until none is: where one was the reason
-/// for others, these stay. Values of all places follow at the end.
-bool DualActiveSet::drop_wrong_columns(const Riccati& riccati) noexcept {
+/// for others, these stay. Values of all places follow at the end, also of changes that are pending.
+void DualActiveSet::drop_wrong_columns(const Riccati& riccati) noexcept {
   const int first_count = column_count(), changes_before = changes_;
   int first_columns[max_columns_with_limits];
   double first_values[max_columns_with_limits];
   for (int k = 0; k < first_count; ++k) {
     first_columns[k] = columns_[k];
     first_values[k] = value_[columns_[k]];
+    if (has_pending_) value_[columns_[k]] = target(columns_[k], multipliers_[k]);
   }
-  Weights weights{};
+  Weights& weights = pending_;
   // By how much the objective would change, about.
   const auto find_worst = [&] {
     int worst = none;
@@ -407,10 +410,10 @@ bool DualActiveSet::drop_wrong_columns(const Riccati& riccati) noexcept {
       value_[columns_[k]] = target(columns_[k], multipliers_[k]);
     }
   }
-  if (changes_ == changes_before) return false;
+  if (changes_ == changes_before && !has_pending_) return;
   for (int k = 0; k < first_count; ++k) value_[first_columns[k]] = first_values[k];
-  add_sensitivities(riccati, weights, value_);
-  return true;
+  has_pending_ = true;
+  write_pending(riccati);
 }
 
 bool DualActiveSet::release_wrong_held() noexcept {
@@ -454,7 +457,8 @@ bool DualActiveSet::add_controls_together(const StageQp& qp, Riccati& riccati, i
       ++changes_;
     }
   }
-  return_to_bounds(riccati);
+  return_to_bounds();
+  if (!has_limits_) write_pending(riccati);
   return true;
 }
 
@@ -473,15 +477,17 @@ void DualActiveSet::append_column(int place, double square, double multiplier) n
 DualActiveSet::Outcome DualActiveSet::add(const StageQp& qp, Riccati& riccati, int entering,
                                           Clock::time_point deadline) noexcept {
   // Values change with the multipliers, but only few of them are needed before the entering bound is met.
-  Weights changes{};
+  Weights changes{}, direction;
   bool has_changes = false;
-  int used = 0;  // batches from there on are empty
-  GatheredPlaces others;
-  bool has_others = false;
+  int used = 0;         // batches from there on are empty
+  GatheredPlaces near;  // bounds with sensitivities, then held ones, with limits
+  int others = 0;       // those with sensitivities
+  int entering_at = 0;  // of them
+  bool is_gathered = false, are_held_gathered = false;
   const auto count_used = [&] {
     used = batch_count_;
     while (used > 0 && batches_[used - 1].count == 0) --used;
-    has_others = false;
+    is_gathered = are_held_gathered = false;
   };
   count_used();
   const auto sum_at = [&](const Weights& weights, int place) {
@@ -513,28 +519,35 @@ DualActiveSet::Outcome DualActiveSet::add(const StageQp& qp, Riccati& riccati, i
       if (is_capped && linear(entering) == 0.0) relaxed_[entering] = 1;
     }
   };
+  const auto gather = [&] {
+    if (!has_limits_ || is_gathered || used > GatheredPlaces::most_batches) return;
+    near.clear();
+    for (int k = 0; k < used; ++k)
+      for (int c = 0; c < batches_[k].count; ++c)
+        if (const int place = batches_[k].of[c]; number_[place] == k * batch_size + c) near.add(place);
+    others = near.count();
+    entering_at = 0;
+    while (near.place(entering_at) != entering) ++entering_at;
+    are_held_gathered = others + static_cast<int>(held_places_.size()) <= GatheredPlaces::most;
+    if (are_held_gathered)
+      for (const int place : held_places_) near.add(place);
+    for (int k = 0; k < used; ++k) near.add_batch(batches_[k].count > 0 ? sensitivities_at(k, 0) : nullptr);
+    near.begin(value_.data(), has_changes ? &changes : nullptr);
+    is_gathered = true;
+  };
   // With limits, the next one is looked for among the bounds that have sensitivities, where most are, before all values
   // are written.
   const auto enter_next = [&] {
-    if (!has_limits_ || used > GatheredPlaces::most_batches) return false;
-    if (!has_others) {
-      others.clear();
-      for (int k = 0; k < used; ++k)
-        for (int c = 0; c < batches_[k].count; ++c)
-          if (const int place = batches_[k].of[c]; number_[place] == k * batch_size + c) others.add(place);
-      for (int k = 0; k < used; ++k) others.add_batch(batches_[k].count > 0 ? sensitivities_at(k, 0) : nullptr);
-      has_others = true;
-    }
-    const std::span<const double> values = others.values(value_.data(), changes);
-    double largest = 0.0, value = 0.0;
-    for (std::size_t k = 0; k < values.size(); ++k) {
-      const int place = others.places()[k];
-      const double violation = std::max(least_[place] - values[k], values[k] - most_[place]);
+    if (!is_gathered) return false;
+    double largest = 0.0;
+    for (int k = 0; k < others; ++k) {
+      const int place = near.place(k);
+      const double violation = std::max(least_[place] - near.value(k), near.value(k) - most_[place]);
       if (!(violation > 0.0)) continue;
       const double gain = violation * violation / -sensitivity(place, place);
-      if (gain > largest) largest = gain, entering = place, value = values[k];
+      if (gain > largest) largest = gain, entering = place, entering_at = k;
     }
-    if (largest > 0.0) enter(value);
+    if (largest > 0.0) enter(near.value(entering_at));
     return largest > 0.0;
   };
   enter(value_[entering]);
@@ -545,6 +558,7 @@ DualActiveSet::Outcome DualActiveSet::add(const StageQp& qp, Riccati& riccati, i
       if (!find_sensitivities_of_next(qp, riccati, &entering, 1, -infinity)) return Outcome::too_much;
       count_used();
     }
+    gather();
     // Change of values and multipliers while the entering multiplier grows and the active bounds stay met.
     const int count = column_count();
     double pull[max_columns_with_limits], row[max_columns_with_limits];
@@ -553,7 +567,8 @@ DualActiveSet::Outcome DualActiveSet::add(const StageQp& qp, Riccati& riccati, i
     back_substitute(pull);
     for (int k = 0; k < count; ++k) pull[k] *= side;
     // Until the entering bound is met, or a multiplier reaches zero.
-    double length = square > 0.0 ? side * (value_of(entering) - target(entering, multiplier)) / square : infinity;
+    const double entering_value = is_gathered ? near.value(entering_at) : value_of(entering);
+    double length = square > 0.0 ? side * (entering_value - target(entering, multiplier)) / square : infinity;
     int blocking_column = none, blocking_held = none;
     bool reaches_end = false, grows = false;
     if (is_capped && relaxed_[entering] == 0) {
@@ -577,14 +592,17 @@ DualActiveSet::Outcome DualActiveSet::add(const StageQp& qp, Riccati& riccati, i
       violation_[other] = until;
       if (until < length) length = until, blocking_column = k, grows = false;
     }
-    Weights direction{};
+    std::fill_n(direction.begin(), used, Weights::value_type{});
     weight_of(entering, direction) = side;
     for (int k = 0; k < count; ++k) weight_of(columns_[k], direction) -= pull[k];
-    for (const int other : held_places_) {
-      const double loss = -side_[other] * sum_at(direction, other);
+    if (is_gathered) near.turn(direction);
+    for (int k = 0; k < static_cast<int>(held_places_.size()); ++k) {
+      const int other = held_places_[k];
+      const double loss = -side_[other] * (are_held_gathered ? near.rate(others + k) : sum_at(direction, other));
       violation_[other] = infinity;
       if (!(loss > 0.0) || is_equality_bound(other)) continue;
-      const double until = std::max(side_[other] * value_of(other), 0.0) / loss;
+      const double value = are_held_gathered ? near.value(others + k) : value_of(other);
+      const double until = std::max(side_[other] * value, 0.0) / loss;
       violation_[other] = until;
       if (until < length) length = until, blocking_held = other;
     }
@@ -594,6 +612,7 @@ DualActiveSet::Outcome DualActiveSet::add(const StageQp& qp, Riccati& riccati, i
     has_changes = true;
     for (int k = 0; k < used; ++k)
       for (int c = 0; c < batch_size; ++c) changes[k][c] += length * direction[k][c];
+    if (is_gathered) near.advance(length);
     if (blocking_held != none) {
       write_values();
       std::erase(held_places_, blocking_held);
@@ -629,22 +648,25 @@ DualActiveSet::Outcome DualActiveSet::add(const StageQp& qp, Riccati& riccati, i
       if (enter_next()) continue;
       write_values();
       value_[met] = value;
-      if (has_limits_ && largest_miss() > exactness) return_to_bounds(riccati);
+      if (has_limits_ && largest_miss() > exactness) {
+        return_to_bounds();
+        write_pending(riccati);
+      }
       return Outcome::solved;
     }
   }
 }
 
-/// The columns, and with limits also what follows one stage behind an active bound: where a horizon moves along, that
-/// was active in the last sample. Leaves room for a few others. Returns their number.
-int DualActiveSet::list_with_next(int* places) const noexcept {
-  int count = column_count();
-  std::copy_n(columns_.data(), count, places);
+/// The columns from the given one on, and with limits also what follows one stage behind an active bound: where a
+/// horizon moves along, that was active in the last sample. Leaves room for a few others. Returns their number.
+int DualActiveSet::list_with_next(int first, int* places) const noexcept {
+  int count = column_count() - first;
+  std::copy_n(columns_.data() + first, count, places);
   const auto add_next = [&](int place) {
     const int next = place + (is_limit(place) ? limit_row_ : stride_);
     const bool is_there = is_limit(place) ? next < all_places_ : next < places_;
     if (count >= most_foreseen || !is_there || hold_[next] != Hold::free || !(violation_[next] > -infinity)) return;
-    if (std::find(places, places + count, next) == places + count) places[count++] = next;
+    if (number_[next] == none && std::find(places, places + count, next) == places + count) places[count++] = next;
   };
   if (!has_limits_) return count;
   for (const int place : held_places_) add_next(place);
@@ -657,7 +679,8 @@ DualActiveSet::Found DualActiveSet::find_values(const StageQp& qp, Riccati& ricc
                                                 Iterate& step) noexcept {
   // A few claims without multipliers get their sensitivities together with those of the bounds that are violated then.
   const bool lacks_sensitivities = column_count() > 0 && number_[columns_[0]] == none;
-  const bool may_wait = lacks_sensitivities && !has_base_ && changes_ == 0 && column_count() < batch_size;
+  const bool may_wait = lacks_sensitivities && !has_base_ && changes_ == 0 &&
+                        (has_limits_ ? column_count() % batch_size != 0 : column_count() < batch_size);
   // After a change, the violations are known.
   if (lacks_sensitivities && !may_wait && !find_sensitivities_of_columns(qp, riccati, has_limits_ && changes_ > 0))
     return Found::nothing;
@@ -678,8 +701,11 @@ DualActiveSet::Found DualActiveSet::find_values(const StageQp& qp, Riccati& ricc
   if (may_wait) {
     find_violations();
     std::array<int, batch_size> first{};
-    if (!find_sensitivities_of_next(qp, riccati, first.data(), list_with_next(first.data()), -infinity))
-      return Found::nothing;
+    const int whole = column_count() / batch_size * batch_size;
+    for (int k = 0; k < whole; k += batch_size)
+      if (!find_sensitivities(qp, riccati, columns_.data() + k, batch_size)) return Found::nothing;
+    const int count = list_with_next(whole, first.data());
+    if (!find_sensitivities_of_next(qp, riccati, first.data(), count, -infinity)) return Found::nothing;
     factor_columns(0, true);
     // `base_places_` may have columns that are left out now; their multipliers are zero.
     base_places_ = columns_;
@@ -687,7 +713,8 @@ DualActiveSet::Found DualActiveSet::find_values(const StageQp& qp, Riccati& ricc
   }
   miss_ = largest_miss();
   if (miss_ <= exactness) return check.violates ? Found::values : Found::step;
-  return_to_bounds(riccati);
+  return_to_bounds();
+  if (!has_limits_) write_pending(riccati);
   return Found::values;
 }
 
@@ -782,6 +809,10 @@ DualActiveSet::Outcome DualActiveSet::solve(const StageQp& qp, Riccati& riccati,
     } else if (found == Found::step) {
       write(qp, active, step);
       return Outcome::solved;
+    } else if (is_cheap_ && miss_ <= small_miss) {
+      write_values(step);
+      write(qp, active, step);
+      return Outcome::solved;
     } else if (has_limits_ && (refinements == refinements_before_holding || miss_ > less * last_miss)) {
       // Rounding: the columns of controls are nearly dependent. Held, they are exact.
       if (holds_no_column()) {
@@ -805,6 +836,16 @@ DualActiveSet::Outcome DualActiveSet::solve(const StageQp& qp, Riccati& riccati,
     return Outcome::too_much;
   write(qp, active, step);
   return Outcome::solved;
+}
+
+/// Writes states, controls and multipliers of held bounds, which sensitivities have corrected since the step was found.
+/// Its costates have none, and are those of the multipliers before.
+void DualActiveSet::write_values(Iterate& step) const noexcept {
+  std::copy_n(value_.begin(), places_, step.row(0));
+  for (const int place : held_places_) {
+    step.bound_row(0)[place] = value_[place];
+    step.row(0)[place] = bound(place);
+  }
 }
 
 void DualActiveSet::write(const StageQp& qp, ActiveSet& active, Iterate& step) const noexcept {

@@ -188,7 +188,9 @@ bool Riccati::factor_if_convex(const StageQp& qp, const ActiveSet& active) noexc
 
 bool Riccati::convexify(StageQp& qp, const ActiveSet& no_bounds) noexcept {
   for_steps_ = true;
-  const RiccatiView view = begin_factor(qp, no_bounds, nullptr);
+  RiccatiView view = begin_factor(qp, no_bounds, nullptr);
+  view.own_H = qp.H(0);
+  view.is_reflected = &convexified_;
   double* const formed = work_.data();
   double* const reduced = formed + static_cast<std::ptrdiff_t>(ns_ + nw_) * stride_;
   double* const factor = reduced + static_cast<std::ptrdiff_t>(width_) * width_;

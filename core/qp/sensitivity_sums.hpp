@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
-#include <span>
+#include <cstring>
 
 #include "rhec/core/kernels/kernel_sets.hpp"
 #include "rhec/core/kernels/riccati_kernels.hpp"
@@ -32,13 +32,14 @@ void for_each_weighted(const Weights& weights, const Function& function) {
 /// sensitivities, one batch behind the other.
 class GatheredPlaces {
  public:
-  static constexpr int most = 48, most_batches = 6;
+  static constexpr int most = 96, most_batches = 6;
   static constexpr int size = response_batch;
 
   void clear() noexcept { count_ = batches_ = 0; }
   void add(int place) noexcept {
     if (count_ < most) places_[count_++] = place;
   }
+  int count() const noexcept { return count_; }
   /// `values` are a batch's sensitivities at all places; null for one that is empty. There is room for `most_batches`.
   void add_batch(const double* values) noexcept {
     double* to = sensitivities_.data() + static_cast<std::ptrdiff_t>(batches_++) * most * size;
@@ -47,28 +48,45 @@ class GatheredPlaces {
       return;
     }
     for (int k = 0; k < count_; ++k)
-      std::copy_n(values + static_cast<std::ptrdiff_t>(places_[k]) * size, size, to + k * size);
+      std::memcpy(to + k * size, values + static_cast<std::ptrdiff_t>(places_[k]) * size, size * sizeof(double));
     // Sums are found eight at a time.
     std::fill(to + count_ * size, to + padded() * size, 0.0);
   }
-  std::span<const int> places() const noexcept { return {places_.data(), static_cast<std::size_t>(count_)}; }
-  /// The values of the places once the weighted sensitivities of all batches are added.
+  /// The values are those before and the sensitivities with these weights (null: none).
   template <class Weights>
-  std::span<const double> values(const double* before, const Weights& weights) noexcept {
+  void begin(const double* before, const Weights* weights) noexcept {
     for (int k = 0; k < count_; ++k) values_[k] = before[places_[k]];
     std::fill(values_.begin() + count_, values_.begin() + padded(), 0.0);
-    for (int k = 0; k < batches_; ++k)
-      riccati_kernels().combine(sensitivities_.data() + static_cast<std::ptrdiff_t>(k) * most * size, weights[k].data(),
-                                values_.data(), padded());
-    return {values_.data(), static_cast<std::size_t>(count_)};
+    if (weights) sum(*weights, values_.data());
   }
+  /// The rates of the values where sensitivities are added with these weights.
+  template <class Weights>
+  void turn(const Weights& weights) noexcept {
+    std::fill(rates_.begin(), rates_.begin() + padded(), 0.0);
+    sum(weights, rates_.data());
+  }
+  void advance(double length) noexcept {
+    for (int k = 0; k < padded(); ++k) values_[k] += length * rates_[k];
+  }
+  int place(int k) const noexcept { return places_[k]; }
+  double value(int k) const noexcept { return values_[k]; }
+  double rate(int k) const noexcept { return rates_[k]; }
 
  private:
   int padded() const noexcept { return (count_ + size - 1) / size * size; }
+  template <class Weights>
+  void sum(const Weights& weights, double* sums) const noexcept {
+    const double *batches[most_batches], *of_batch[most_batches];
+    for (int k = 0; k < batches_; ++k) {
+      batches[k] = sensitivities_.data() + static_cast<std::ptrdiff_t>(k) * most * size;
+      of_batch[k] = weights[k].data();
+    }
+    riccati_kernels().combine_batches(batches, of_batch, batches_, sums, padded());
+  }
 
   int count_ = 0, batches_ = 0;
   std::array<int, most> places_;  // NOLINT(*-member-init): set as far as they count
-  alignas(64) std::array<double, most> values_;
+  alignas(64) std::array<double, most> values_, rates_;
   alignas(64) std::array<double, most_batches * most * size> sensitivities_;
 };
 

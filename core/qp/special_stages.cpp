@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "rhec/core/kernels/reflection.hpp"
 #include "rhec/core/kernels/riccati_kernels.hpp"
 #include "rhec/core/qp/riccati.hpp"
 #include "rhec/core/qp/small_matrix.hpp"
@@ -140,24 +141,14 @@ void Riccati::null_space(const double* D, const double* E, int width, const bool
 
 namespace {
 
-// Of reflected eigenvalues: the least size of the largest, and of all relative to it.
-constexpr double least_curvature = 1e-12, least_ratio = 1e-8;
-
-/// Reflects the negative eigenvalues of a symmetric matrix of two rows: the sum of |eigenvalue| times the projection on
-/// its eigenvector. Most vehicles have two inputs, and the general method takes many times as long.
+/// See `reflect` of two rows.
 void reflect_two(double* matrix) noexcept {
-  double &a = matrix[0], &b = matrix[1], &c = matrix[3];
-  const double mean = 0.5 * (a + c), radius = std::hypot(0.5 * (a - c), b);
-  const double upper = mean + radius, lower = mean - radius;
-  const double top = std::max({std::abs(upper), std::abs(lower), least_curvature});
-  const double first = std::max(std::abs(upper), least_ratio * top),
-               second = std::max(std::abs(lower), least_ratio * top);
-  // M = upper P + lower (1 - P), so |M| = second + (first - second) P.
-  const double share = radius > 0.0 ? (first - second) / (2.0 * radius) : 0.0;
-  const double left = second - share * lower;
-  a = left + share * a;
-  b = matrix[2] = share * b;
-  c = left + share * c;
+  const PairMatrix before{matrix[0], matrix[1], matrix[3]};
+  const double radius = std::hypot(0.5 * (before.first - before.second), before.beside);
+  const PairMatrix now = rhec::reflect(before, radius);
+  matrix[0] = now.first;
+  matrix[1] = matrix[2] = now.beside;
+  matrix[3] = now.second;
 }
 
 /// Turns the vectors x and y of n numbers, `step` apart, by an angle of this sine and cosine.

@@ -27,6 +27,9 @@ constexpr int most_polishes = 2;
 /// Iterations after which another kind of start is more promising. Runs that take longer are mostly those that wander
 /// in directions of negative curvature, or try to meet limits that cannot be met.
 constexpr int patience = 150;
+/// Iterations of a restoration after which the least violation is looked for instead, by exact derivatives: where
+/// limits cannot be met, Ipopt's own restoration wanders on.
+constexpr int patience_with_restoration = 25;
 /// A violation of the dynamics, or of limits, too large for rounding.
 constexpr double clear_violation = 1e-6;
 /// A point is stationary for the violation if its slope there, relative to the violation, is at most this.
@@ -219,6 +222,9 @@ void IpoptSolver::keep_if_better(const PrimalDual& iterate) noexcept {
 
 bool IpoptSolver::see(int iteration, const PrimalDual* iterate) noexcept {
   if (iteration > 0) ++iterations_;
+  restoring_ = iterate ? 0 : restoring_ + 1;
+  is_stuck_ = may_be_stuck_ && restoring_ > patience_with_restoration;
+  if (is_stuck_) return false;
   if (iterate) {
     keep_if_better(*iterate);
     if (seen_kkt_.largest() <= options_.tolerance) {
@@ -257,12 +263,16 @@ IpoptSolver::Ending IpoptSolver::run(Start start) {
   if (start == Start::polish) barrier = polish_barrier;
   set_run_options(start, barrier);
   spare_iterations_ = most_spare_iterations;
+  restoring_ = 0;
+  may_be_stuck_ = !is_judged_ && start != Start::warm && start != Start::polish;
+  is_stuck_ = false;
   nlp_->set_curvature(start == Start::gauss_newton ? Curvature::gauss_newton : options_.hessian);
   nlp_->set_start(from, barrier);
   const auto outcome = optimize(Ipopt::GetRawPtr(nlp_));
   if (best_kkt_.largest() <= options_.tolerance) return Ending::converged;
   if (stopped_late_ || outcome == Ipopt::Maximum_CpuTime_Exceeded) return Ending::out_of_time;
   if (iterations_ >= options_.max_iterations) return Ending::out_of_iterations;
+  if (is_stuck_) return Ending::infeasible;
   if ((outcome == Ipopt::Infeasible_Problem_Detected || outcome == Ipopt::Restoration_Failed) &&
       violation_of(seen_kkt_) > clear_violation)
     return Ending::infeasible;
@@ -273,6 +283,8 @@ IpoptSolver::Ending IpoptSolver::run(Start start) {
 /// the last one. The iterations are not of the problem itself, and not counted.
 bool IpoptSolver::is_infeasible() {
   nearest_ = guess_;
+  is_judged_ = true;
+  may_be_stuck_ = is_stuck_ = false;
   int left = std::min(options_.max_iterations, most_iterations_of_violation);
   for (int solve = 0; solve < most_solves_of_violation && left > 0; ++solve) {
     set_run_options(Start::cold, 0.0);
@@ -319,7 +331,7 @@ bool IpoptSolver::improve(const Ocp& ocp, Iterate& iterate, Report& report) {
     ending = best_kkt_.largest() <= options_.tolerance ? Ending::converged : Ending::lost;
   } else {
     int polishes = 0;
-    bool is_judged = false;
+    bool was_near = false;
     Start begun = warm ? Start::warm : Start::cold;
     for (Start start = begun;;) {
       ending = run(start);
@@ -328,20 +340,29 @@ bool IpoptSolver::improve(const Ocp& ocp, Iterate& iterate, Report& report) {
         continue;
       }
       if (ending == Ending::converged || ending == Ending::out_of_time) break;
-      // That Ipopt's restoration ends somewhere is no proof, and neither are iterations that were too few.
+      // That Ipopt's restoration ends somewhere, or does not end, is no proof, and neither are iterations that were too
+      // few.
       const bool is_last = ending == Ending::out_of_iterations || begun == Start::adaptive;
-      const bool is_in_doubt = is_last || (ending == Ending::infeasible && start != Start::warm);
-      if (is_in_doubt && !is_judged && violation_of(best_kkt_) > clear_violation) {
-        is_judged = report.fallback_used = true;
-        if (is_infeasible()) {
-          ending = Ending::infeasible;
-        } else if (stopped_late_) {
-          ending = Ending::out_of_time;
-        } else if (ending != Ending::out_of_iterations) {
+      const bool is_claim = ending == Ending::infeasible && start != Start::warm;
+      const bool is_in_doubt = is_last || is_claim || (ending == Ending::lost && start == Start::cold);
+      if (is_in_doubt && violation_of(best_kkt_) > clear_violation) {
+        if (!is_judged_) {
+          report.fallback_used = true;
+          if (is_infeasible()) {
+            ending = Ending::infeasible;
+            break;
+          }
+          if (stopped_late_) {
+            ending = Ending::out_of_time;
+            break;
+          }
+        }
+        if (ending == Ending::out_of_iterations) break;
+        if ((is_last || is_claim) && !was_near) {
+          was_near = true;
           start = Start::nearest;
           continue;
         }
-        break;
       }
       report.fallback_used |= ending != Ending::out_of_iterations;
       if (is_last) {
@@ -382,7 +403,7 @@ Report IpoptSolver::solve(Iterate& iterate, Clock::time_point deadline) noexcept
   deadline_ = deadline;
   iterations_ = 0;
   backend_us_ = 0.0;
-  stopped_late_ = false;
+  stopped_late_ = is_judged_ = false;
   bool is_assessed = false;
   try {
     std::unique_lock hold(backend_lock(), std::defer_lock);

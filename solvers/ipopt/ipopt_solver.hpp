@@ -33,9 +33,10 @@ struct IpoptOptions {
 /// guess, in this order: without the guess' multipliers, with the Gauss-Newton instead of the exact Hessian, and with
 /// an adaptive barrier parameter. All runs together take at most max_iterations, and the report flags the fallback.
 ///
-/// Where a run says that constraints cannot be met, or none has met them, the violation alone is minimised from the
-/// guess (ViolationNlp), once, with a budget of its own. The problem is infeasible if that ends where the violation is
-/// stationary and not zero; otherwise the next run begins at the point that was found, if there are iterations left.
+/// Where a run says that constraints cannot be met, is in restoration for long, or has not met them from the guess
+/// alone, the violation alone is minimised from the guess (ViolationNlp), once, with a budget of its own. The problem
+/// is infeasible if that ends where the violation is stationary and not zero; otherwise a run begins at the point that
+/// was found, after such a claim or where no other has met them, if there are iterations left.
 ///
 /// Ipopt 3.11 has a global counter and MUMPS keeps global state, so solves are serialised across the process; waiting
 /// counts towards the deadline. Every solve builds Ipopt's algorithm anew, so only the guess carries over from one
@@ -104,6 +105,10 @@ class IpoptSolver final : public Solver, private Spectator {
   KktResidual best_kkt_, seen_kkt_;
   double best_objective_ = 0.0, backend_us_ = 0.0;
   bool stopped_late_ = false;
+  bool is_judged_ = false;     ///< the least violation was looked for
+  bool may_be_stuck_ = false;  ///< a restoration that takes long ends the run
+  bool is_stuck_ = false;      ///< one has
+  int restoring_ = 0;          ///< iterations of the present restoration
   int iterations_ = 0;
   int spare_iterations_ = 0;  ///< left for the barrier to become negligible once the residual is within the tolerance
 };

@@ -341,17 +341,26 @@ bool NloptSolver::polish(const Ocp& ocp, Answer& answer, Clock::time_point deadl
 
 Status NloptSolver::restore_feasibility(const Ocp& ocp, Answer& answer, Clock::time_point deadline) {
   double last = HUGE_VAL;
+  bool is_thorough = false;
   while (answer.violation > infeasible_beyond) {
-    if (answer.violation > 0.9 * last) return Status::infeasible;
+    if (answer.violation > 0.9 * last) {
+      // Short runs lose the curvature that they have learnt.
+      if (is_thorough || !problem_.has_limits()) return Status::infeasible;
+      is_thorough = true;
+    }
     last = answer.violation;
     const Transformation transformation = transformation_at(ocp, answer);
+    const long quota = !problem_.has_limits() ? 0
+                       : is_thorough          ? longer_runs * restoring_iterations
+                                              : restoring_iterations;
     Run run(problem_, options_, NLOPT_LD_SLSQP, Run::Goal::violation, transformation,
-            {deadline, iterations_left(), problem_.has_limits() ? restoring_iterations : 0, 1e-4});
+            {deadline, iterations_left(), quota, is_thorough ? 1e-8 : 1e-4});
     const Run::Outcome outcome = run.optimise();
     iterations_ += run.iterations();
     answer = assess(run.x());
     if (outcome == Run::Outcome::deadline) return Status::deadline;
-    if (outcome == Run::Outcome::iteration_limit) return Status::iteration_limit;
+    if (outcome == Run::Outcome::iteration_limit)
+      return is_thorough && answer.violation > 0.9 * last ? Status::infeasible : Status::iteration_limit;
     if (outcome == Run::Outcome::failed) return Status::stalled;
   }
   return Status::solved;

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 
 #include "rhec/core/kernels/kernel_sets.hpp"
@@ -120,6 +121,58 @@ TEST(RiccatiKernels, OfTheRecursionAgreeWithTheDenseSystem) {
       }
     }
   }
+}
+
+/// A symmetric matrix with its eigenvalues' absolute values, by Eigen.
+Eigen::Matrix2d reflected(const Eigen::Matrix2d& matrix) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(matrix);
+  return eigen.eigenvectors() * eigen.eigenvalues().cwiseAbs().asDiagonal() * eigen.eigenvectors().transpose();
+}
+
+TEST(RiccatiKernels, ReflectTwoControlsThatAreNotConvexWhereTheyMayWriteH) {
+  RandomQp random(15);
+  int reflected_stages = 0;
+  for (int trial = 0; trial < 100; ++trial) {
+    StageQp qp = random.make(1, random.integer(5, 8), 2, true);
+    if (trial % 2 == 0) random.carry(qp);
+    const int stride = qp.stride(), states = qp.states(0);
+    if (qp.controls(0) != 2) continue;
+    for (int j = 0; trial % 5 > 0 && j < 2; ++j) R_of(qp, 0)(j, j) -= random.uniform(0.0, 40.0);
+    const ActiveSet none(qp.capacity());
+    // With one interval the reduced Hessian is R + B'QB.
+    Eigen::MatrixXd B(states, 2), Q(states, states);
+    Eigen::Matrix2d reduced;
+    for (int r = 0; r < states; ++r) {
+      for (int c = 0; c < 2; ++c) B(r, c) = qp.AB(0)[r * stride + states + c];
+      for (int c = 0; c < states; ++c) Q(r, c) = qp.H(1)[c * stride + r];
+    }
+    for (int r = 0; r < 2; ++r)
+      for (int c = 0; c < 2; ++c) reduced(r, c) = R_of(qp, 0)(r, c);
+    const Eigen::Matrix2d known = B.transpose() * Q * B;
+    reduced += known;
+    const bool is_convex = reduced.determinant() > 0.0 && reduced.trace() > 0.0;
+    reflected_stages += !is_convex;
+    const Eigen::Matrix2d expected = (is_convex ? reduced : reflected(reduced)) - known;
+    for (const KernelSet& set : runnable_kernels()) {
+      StageQp own = qp;
+      Recursion recursion(own, none);
+      bool is_reflected = false;
+      EXPECT_EQ(set.riccati->factor(recursion.view, 0, 1e-11), is_convex ? -1 : 0) << set.instruction_set;
+      recursion.view.own_H = own.H(0);
+      recursion.view.is_reflected = &is_reflected;
+      const int left = set.riccati->factor(recursion.view, 0, 1e-11);
+      // Shapes that are not compiled are left to the caller, with H as it was.
+      EXPECT_EQ(is_reflected, !is_convex && left < 0) << set.instruction_set;
+      const double size = 1e-11 * (1.0 + reduced.norm() + known.norm());
+      for (int r = 0; r < 2; ++r)
+        for (int c = 0; c < 2; ++c)
+          EXPECT_NEAR(R_of(own, 0)(r, c), left < 0 ? expected(r, c) : R_of(qp, 0)(r, c), size) << set.instruction_set;
+      if (left < 0) {
+        EXPECT_EQ(set.riccati->factor(Recursion(own, none).view, 0, 1e-11), -1) << set.instruction_set;
+      }
+    }
+  }
+  EXPECT_GT(reflected_stages, 20);
 }
 
 TEST(RiccatiKernels, OfResponsesAreWhatAStepDiffersBy) {
@@ -330,6 +383,27 @@ TEST(RiccatiKernels, CombineABatchByItsWeights) {
         for (int k = 0; k < response_batch; ++k) expected += batch[j * response_batch + k] * of_batch[k];
         EXPECT_NEAR(sums[j], expected, 1e-12) << set.instruction_set;
       }
+    }
+  }
+}
+
+TEST(RiccatiKernels, CombineSeveralBatchesAsOneAfterTheOther) {
+  RandomQp random(16);
+  for (int trial = 0; trial < 40; ++trial) {
+    const int count = padded(random.integer(1, 40)), number = random.integer(0, 7);
+    std::vector<AlignedDoubles> batches, weights;
+    std::vector<const double*> of_batches, of_weights;
+    for (int k = 0; k < number; ++k) {
+      batches.push_back(numbers(random, static_cast<std::size_t>(count) * response_batch));
+      weights.push_back(numbers(random, response_batch));
+      of_batches.push_back(batches.back().data());
+      of_weights.push_back(weights.back().data());
+    }
+    for (const KernelSet& set : runnable_kernels()) {
+      AlignedDoubles expected(count, 0.5), sums = expected;
+      for (int k = 0; k < number; ++k) set.riccati->combine(of_batches[k], of_weights[k], expected.data(), count);
+      set.riccati->combine_batches(of_batches.data(), of_weights.data(), number, sums.data(), count);
+      for (int j = 0; j < count; ++j) EXPECT_NEAR(sums[j], expected[j], 1e-11) << set.instruction_set;
     }
   }
 }

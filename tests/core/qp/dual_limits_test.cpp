@@ -134,6 +134,46 @@ TEST(DualLimits, DropsAFewWrongClaimsWithoutAnotherFactorisation) {
   EXPECT_GT(wrong, 200);
 }
 
+TEST(DualLimits, CorrectRoundingBySensitivitiesWhereEachQpHasToBeCheap) {
+  // Large gradients, so that the minimiser is far away until all that holds it is found.
+  constexpr double size = 1e4;
+  RandomQp random(36);
+  int corrected = 0;
+  for (int trial = 0; trial < 300; ++trial) {
+    StageQp qp = limited_qp(random, trial % 2 == 0, {.room = 0.5});
+    for (int i = 0; i <= qp.intervals(); ++i)
+      for (int j = 0; j < qp.stride(); ++j) qp.h(i)[j] *= size;
+    StageQpSolver exact(qp.capacity()), cheap(qp.capacity());
+    cheap.set_cheap(true);
+    Iterate step(qp.capacity()), other(qp.capacity());
+    exact.guess_from(qp, step);
+    cheap.guess_from(qp, other);
+    const auto outcome = exact.solve(qp, step);
+    EXPECT_EQ(cheap.solve(qp, other), outcome);
+    if (outcome != StageQpSolver::Outcome::active_set) continue;
+    bool differs = false;
+    for (int i = 0; i <= qp.intervals(); ++i)
+      for (int j = 0; j < qp.stride(); ++j) differs |= step.row(i)[j] != other.row(i)[j];
+    corrected += differs;
+    EXPECT_LT(distance(qp, step, other), 1e-9 * size) << trial;
+    EXPECT_LT(kkt_violation(qp, other), 1e-7 * size + 10.0 * kkt_violation(qp, step)) << trial;
+    // Bounds and limits are met as well as by the other.
+    for (int i = 0; i <= qp.intervals(); ++i) {
+      for (int j = 0; i < qp.intervals() && j < qp.controls(i); ++j) {
+        EXPECT_GE(other.control(i)[j], qp.control_lower(i)[j] - 1e-9);
+        EXPECT_LE(other.control(i)[j], qp.control_upper(i)[j] + 1e-9);
+      }
+      for (int r = 0; r < qp.limits(i); ++r) {
+        double value = 0.0;
+        for (int j = 0; j < qp.stride(); ++j) value += qp.G(i)[r * qp.stride() + j] * other.row(i)[j];
+        EXPECT_GE(value, qp.limit_lower(i)[r] - 1e-9) << trial;
+        EXPECT_LE(value, qp.limit_upper(i)[r] + 1e-9) << trial;
+      }
+    }
+  }
+  EXPECT_GT(corrected, 5);
+}
+
 TEST(DualLimits, AcceptWhatRoundingLeaves) {
   // Only the last control is cheap enough to bring a state of some millions to zero, to which numbers of that size do
   // not add up by less than a few 1e-10.

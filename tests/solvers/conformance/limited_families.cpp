@@ -252,6 +252,62 @@ std::vector<Limit> beyond_from_the_start(const Stage& stage, double weight) {
   return {{Limit::Kind::linear, {0}, {1.0}, stage.drive[0] + 0.1, infinity, weight, 0.0}};
 }
 
+/// Equations: a place of the gentler drive that is met exactly, at every third node and at the last.
+std::vector<Limit> equations(const Stage& stage) {
+  if (stage.index == 0 || (stage.index % 3 != 0 && stage.index != stage.last)) return {};
+  Limit limit = corridor(stage);
+  limit.lower = limit.upper = limit.value(stage.gentle);
+  return {limit};
+}
+
+/// Units from where a limit is hardly seen to where it is all that is.
+Limits in_other_units() {
+  return [](const Stage& stage, RandomProblem& random) {
+    std::vector<Limit> all;
+    for (Limit limit : some_of_all(stage)) {
+      if (limit.kind == Limit::Kind::distance) continue;
+      const double factor = std::pow(10.0, random.uniform(-4.0, 4.0));
+      for (double& coefficient : limit.with) coefficient *= factor;
+      limit.lower *= factor;
+      limit.upper *= factor;
+      all.push_back(limit);
+    }
+    return all;
+  };
+}
+
+/// One side of some limits, at the last node alone.
+std::vector<Limit> last_only(const Stage& stage) {
+  if (stage.index != stage.last) return {};
+  std::vector<Limit> all{corridor(stage), obstacle(stage)};
+  const double here = all[0].value(stage.drive), there = all[0].value(stage.gentle);
+  (here > there ? all[0].lower : all[0].upper) = here > there ? -infinity : infinity;
+  all[1].upper = infinity;
+  return all;
+}
+
+/// Equations and inequalities, hard and soft, each in its turn.
+Limits of_mixed_kind() {
+  return [](const Stage& stage, RandomProblem& random) {
+    std::vector<Limit> all = some_of_all(stage);
+    for (Limit& limit : all) {
+      if (random.uniform(0.0, 1.0) < 0.4) {
+        limit.linear_weight = random.uniform(0.0, 1.0) < 0.3 ? 0.0 : some_weight(random);
+        limit.quadratic_weight =
+            limit.linear_weight > 0.0 && random.uniform(0.0, 1.0) < 0.5 ? 0.0 : some_weight(random);
+        if (random.uniform(0.0, 1.0) < 0.5) limit.lower = limit.upper = limit.value(stage.gentle);
+      } else if (random.uniform(0.0, 1.0) < 0.3) {
+        limit.lower = -infinity;
+      } else if (random.uniform(0.0, 1.0) < 0.3) {
+        limit.upper = infinity;
+      }
+    }
+    for (const Limit& limit : equations(stage))
+      if (random.uniform(0.0, 1.0) < 0.5) all.push_back(limit);
+    return all;
+  };
+}
+
 }  // namespace
 
 std::vector<Family> limited_families() {
@@ -305,6 +361,17 @@ std::vector<Family> limited_families() {
       .answer = Family::Answer::infeasible;
   add("rhc_limits_soft_start", "the given state is beyond a soft limit",
       limited(on_its_path(), with([](const Stage& stage) { return beyond_from_the_start(stage, 3.0); })));
+  add("rhc_limits_equations", "places that are met exactly", limited(on_its_path(), with(equations))).several_optima =
+      true;
+  add("rhe_limits_equations", "the same on estimates", limited(RheSpec{}, with(equations))).several_optima = true;
+  add("rhc_limits_units", "limits in units from 1e-4 to 1e4", limited(on_its_path(), in_other_units())).several_optima =
+      true;
+  add("rhc_limits_last", "one side of limits at the last node alone", limited(on_its_path(), with(last_only)))
+      .several_optima = true;
+  add("rhc_limits_mixed", "equations and inequalities, hard and soft, over horizons of any length",
+      of_any_length(on_its_path(), of_mixed_kind()))
+      .several_optima = true;
+  add("rhe_limits_mixed", "the same on estimates", of_any_length(RheSpec{}, of_mixed_kind())).several_optima = true;
   return all;
 }
 

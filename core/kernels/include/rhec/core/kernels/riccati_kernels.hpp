@@ -24,6 +24,8 @@ struct RiccatiView {
   const std::uint8_t* special = nullptr;  ///< stages that the kernels skip
   bool keeps_carried = false;  ///< all stages carry the same states, which are given: sensitivities of these are zero
   bool for_steps = true;       ///< whether a step is needed; otherwise `drift` and `T` are neither written nor read
+  double* own_H = nullptr;  ///< H, where `factor` may write a stage with two free controls that is not convex; or null
+  bool* is_reflected = nullptr;  ///< set where it has
 
   double* P = nullptr;  ///< n_s rows per node
   double* U = nullptr;  ///< n_w rows per stage: columns of the reduced Hessian, each as it is eliminated
@@ -43,7 +45,8 @@ struct RiccatiView {
 /// The recursion over stages without active state bounds that their controls must meet.
 struct RiccatiKernels {
   /// Factorises stages first, first - 1, ..., 0. Returns the stage that it leaves to the caller (a special one, or one
-  /// whose pivot is not above `tolerance` times its diagonal entry), or -1.
+  /// whose pivot is not above `tolerance` times its diagonal entry), or -1. Where it may write H, it reflects the
+  /// negative eigenvalues of a stage with two free controls, as far as its shape is compiled, and goes on.
   int (*factor)(const RiccatiView& view, int first, double tolerance);
   /// The same for gradients; only special stages are left to the caller.
   int (*solve_backward)(const RiccatiView& view, int first);
@@ -59,6 +62,9 @@ struct RiccatiKernels {
   void (*sensitivities_forward)(const RiccatiView& view, int last, double* sensitivities, double* costates);
   /// sums += weighted sum of the sensitivities of a batch, for `count` entries, a multiple of eight.
   void (*combine)(const double* batch, const double* weights, double* sums, long count);
+  /// The same for `number` batches, each with weights of its own.
+  void (*combine_batches)(const double* const* batches, const double* const* weights, int number, double* sums,
+                          long count);
   /// Propagates the covariance (rows of the stride) from node `first` to the next special stage, which is returned, or
   /// to node N. Writes those of all nodes on the way to `all`, blocks of n_s x n_s, if it is not null.
   int (*carry_covariance)(const RiccatiView& view, int first, double* covariance, double* all);

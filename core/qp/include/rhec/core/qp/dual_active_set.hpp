@@ -54,6 +54,8 @@ class RHEC_EXPORT DualActiveSet {
   /// its costates and multipliers to `step`. Checks the deadline before every change of the active set.
   Outcome solve(const StageQp& qp, Riccati& riccati, ActiveSet& active, Iterate& step,
                 Clock::time_point deadline) noexcept;
+  /// With limits: whether the last digits of costates matter less than another solution of the equations.
+  void set_cheap(bool cheap) noexcept { is_cheap_ = cheap; }
   /// Forgets what was learnt from earlier solves.
   void reset() noexcept { rows_change_ = false; }
   /// After `solve`: also computes the policy (Riccati::feedback), which `solve` may omit.
@@ -110,20 +112,19 @@ class RHEC_EXPORT DualActiveSet {
                                   double least) noexcept;
   /// Sensitivity of the variable at one place to the gradient of another, which must have sensitivities.
   double sensitivity(int of, int at) const noexcept {
-    const int number = number_[of];
+    const auto number = static_cast<unsigned>(number_[of]);
     return sensitivities_at(number / batch_size, at)[number % batch_size];
   }
   const double* sensitivities_at(int batch, int place) const noexcept {
     return batches_[batch].sensitivities.values.data() + static_cast<std::ptrdiff_t>(place) * batch_size;
   }
   double& weight_of(int place, Weights& weights) const noexcept {
-    return weights[number_[place] / batch_size][number_[place] % batch_size];
+    const auto number = static_cast<unsigned>(number_[place]);
+    return weights[number / batch_size][number % batch_size];
   }
   void add_sensitivities(const Riccati& riccati, const Weights& weights, std::vector<double>& sums) const noexcept;
-  double* factor_row(int k) noexcept { return factor_.data() + static_cast<std::ptrdiff_t>(k) * most_columns_; }
-  const double* factor_row(int k) const noexcept {
-    return factor_.data() + static_cast<std::ptrdiff_t>(k) * most_columns_;
-  }
+  double* factor_row(int k) noexcept { return factor_.data() + std::ptrdiff_t{most_columns_} * k; }
+  const double* factor_row(int k) const noexcept { return factor_.data() + std::ptrdiff_t{most_columns_} * k; }
   int column_count() const noexcept { return static_cast<int>(columns_.size()); }
 
   double eliminate(int entering, int count, double* row) const noexcept;
@@ -134,14 +135,16 @@ class RHEC_EXPORT DualActiveSet {
   bool combine(const StageQp& qp, Riccati& riccati, Iterate& step) noexcept;
   bool solve_with_multipliers(const StageQp& qp, Riccati& riccati, Iterate& step) noexcept;
   double largest_miss() const noexcept;
-  void return_to_bounds(const Riccati& riccati) noexcept;
+  void return_to_bounds() noexcept;
+  void write_pending(const Riccati& riccati) noexcept;
   void release_column(int column, Weights& weights) noexcept;
-  bool drop_wrong_columns(const Riccati& riccati) noexcept;
+  void drop_wrong_columns(const Riccati& riccati) noexcept;
   bool release_wrong_held() noexcept;
   bool drop_wrong(const Riccati& riccati) noexcept;
   Violations find_violations() noexcept;
   bool add_controls_together(const StageQp& qp, Riccati& riccati, int worst) noexcept;
-  int list_with_next(int* places) const noexcept;
+  int list_with_next(int first, int* places) const noexcept;
+  void write_values(Iterate& step) const noexcept;
   void append_column(int place, double square, double multiplier) noexcept;
   Outcome add(const StageQp& qp, Riccati& riccati, int entering, Clock::time_point deadline) noexcept;
   Found find_values(const StageQp& qp, Riccati& riccati, bool may_combine, Iterate& step) noexcept;
@@ -163,8 +166,7 @@ class RHEC_EXPORT DualActiveSet {
   bool correct_soft_column(int k, Weights& weights) noexcept;
   void write_limits(const StageQp& qp, ActiveSet& active, Iterate& step) const noexcept;
 
-  int factorisations_ = 0, changes_ = 0;
-  int states_ = 0, stride_ = 0, limit_row_ = 0;
+  int factorisations_ = 0, changes_ = 0, states_ = 0, stride_ = 0, limit_row_ = 0;
   int most_columns_ = 0, batch_count_ = 0, most_changes_ = 0;
   int places_ = 0, all_places_ = 0;  ///< number of places that the QP uses: of variables, and of limits too
   bool has_limits_ = false;
@@ -174,26 +176,23 @@ class RHEC_EXPORT DualActiveSet {
   ActiveSet held_, claimed_;
   // By place. For a held variable, the value is its multiplier, since this is what changes.
   std::vector<double> value_, violation_, largest_;  ///< the last: of each eight violations
-  /// The bounds widened by their tolerance; infinite for variables that are not free.
-  std::vector<double> least_, most_;
+  std::vector<double> least_, most_;  ///< the bounds widened by their tolerance; infinite for variables not free
   std::vector<Hold> hold_;
   std::vector<std::int8_t> side_;  ///< of the active bound
   std::vector<int> number_;        ///< index among the sensitivities, or none
-  std::vector<int> held_places_;
+  std::vector<int> held_places_, saturated_;
   // With limits only.
-  AlignedDoubles own_lower_, own_upper_;
-  AlignedDoubles rows_;                    ///< G at the last `prepare`
-  bool rows_change_ = false;               ///< a `solve` found another one
+  AlignedDoubles own_lower_, own_upper_, rows_;                        ///< the last: G at the last `prepare`
+  bool rows_change_ = false, has_pending_ = false, is_cheap_ = false;  ///< `solve` found another G; see `pending_`
   std::vector<double> linear_, softness_;  ///< by limit: weight of the slack, reciprocal quadratic weight (or 0)
   std::vector<std::uint8_t> relaxed_;
-  std::vector<int> saturated_;
   std::vector<Batch> batches_;
   std::vector<int> columns_;  ///< active bounds that are not held, in the order of the Cholesky factor
   std::vector<double> multipliers_, factor_;
-  /// The multipliers with which the step was found.
+  Weights pending_{};  ///< changes of multipliers that the values do not have yet
   std::vector<int> base_places_;
-  std::vector<double> base_multipliers_;
-  std::vector<double> h_;  ///< the QP's gradient plus the multipliers of the columns
+  std::vector<double> base_multipliers_;  ///< with which the step was found
+  std::vector<double> h_;                 ///< the QP's gradient plus the multipliers of the columns
   Iterate policy_step_;
 };
 

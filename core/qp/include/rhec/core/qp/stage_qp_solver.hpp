@@ -62,10 +62,10 @@ class RHEC_EXPORT StageQpSolver {
   /// True if the Hessian has been convexified since the last `guess_from`.
   bool was_convexified() const noexcept { return was_convexified_ || riccati_.was_convexified(); }
   int factorisations() const noexcept { return factorisations_; }
-  /// With limits, whether QPs that are not convex are consecutive ones of a controller, each of which has to be cheap:
-  /// one is convexified at once, unless augmenting the last one for its active limits has done, or was not tried
-  /// lately.
-  void set_cheap(bool cheap) noexcept { is_cheap_ = cheap; }
+  /// With limits, whether QPs are consecutive ones of a controller, each of which has to be cheap: one that is not
+  /// convex is convexified at once, unless augmenting the last one for its active limits has done, or many in a row
+  /// were not. Rounding beyond bounds and limits is corrected in the step, but not in its costates.
+  void set_cheap(bool cheap) noexcept { is_cheap_ = cheap, dual_.set_cheap(cheap && capacity_.limits > 0); }
   void reset() noexcept;
 
  private:
@@ -134,7 +134,7 @@ class RHEC_EXPORT StageQpSolver {
   bool is_dual_ = false;          ///< the last solution is from `dual_`
   bool out_of_time_ = false;
   bool is_cheap_ = false, has_fitted_ = false;  ///< the augmentation for the last QP that was not convex
-  int not_convex_ = 0, wait_ = 0;  ///< consecutive QPs that were not, and those before the augmentation is tried again
+  int not_convex_ = 0, wait_ = 0;  ///< consecutive QPs that were not, and those before the augmentation is tried
   bool any_active_ = true;         ///< false: certainly no bound is active
   int factorisations_ = 0;
   double gradient_scale_ = 1.0;      ///< of the last interior-point solution: scale of a slack of one
