@@ -271,8 +271,10 @@ TEST_P(OffsetFaults, TwoReceiversThatDifferForLongAreBothNamed) {
       std::ptrdiff_t said = 0;
       for (std::size_t k = 20; k < episode.during.size(); ++k) {
         const Episode::Sample& sample = episode.during[k];
-        if (sample.words.find("x_rough and y_rough off by about ") == std::string::npos) continue;
+        EXPECT_NE(sample.health, HealthLevel::ok);
+        if (sample.words.find(" off by about ") == std::string::npos) continue;
         ++said;
+        EXPECT_THAT(sample.words, HasSubstr("degraded: x_rough and y_rough "));
         EXPECT_THAT(sample.words, HasSubstr(" m from x_gps and y_gps"));
         EXPECT_EQ(sample.health, HealthLevel::degraded);
         EXPECT_TRUE(sample.inside);
