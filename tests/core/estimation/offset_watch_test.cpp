@@ -280,7 +280,7 @@ TEST_P(OffsetFaults, TwoReceiversThatDifferForLongAreBothNamed) {
         EXPECT_TRUE(sample.inside);
         EXPECT_LT(sample.error, std::max(usual_error, 1.2 * size));
       }
-      EXPECT_GE(said, 60);
+      EXPECT_GE(said, 40) << "in some rides most of its samples fail their gate, and are rejected for some time";
     }
   }
 }
