@@ -80,6 +80,7 @@ Estimator::Estimator(std::unique_ptr<EstimationMethod> method, const Timeline& t
                      std::unique_ptr<SensorWatch> watch)
     : Estimator(std::move(method), timeline) {
   watch_ = std::move(watch);
+  method_->listen(watch_->make_memo());
   const std::size_t sensors = watch_->sensors().size();
   constexpr double least_lateness = 1.0;  // [s]
   clocks_ = std::make_unique<Clocks>(
@@ -356,7 +357,7 @@ void Estimator::through_motion(double from, double to, Clock::time_point deadlin
       i = 0;
       is_hasty = true;
     }
-    advance(from + (to - from) * i / parts, from + (to - from) * (i + 1) / parts);
+    advance(from + (to - from) * i / parts, i + 1 == parts ? to : from + (to - from) * (i + 1) / parts);
   }
 }
 

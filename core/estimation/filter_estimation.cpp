@@ -5,10 +5,12 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <span>
 #include <utility>
 
 #include <fmt/format.h>
 
+#include "filter_memo.hpp"
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/horizon/rhe_problem.hpp"
 
@@ -37,6 +39,11 @@ FilterEstimation::FilterEstimation(const std::shared_ptr<const Model>& model, Se
   predicted_.assign(model->output_count(), 0.0);
   jacobian_.assign(static_cast<std::size_t>(model->output_count()) * model->state_count(), 0.0);
   reset();
+}
+
+void FilterEstimation::listen(std::shared_ptr<const FilterMemo> memo) {
+  const FilterMemo::Setup same{.noise = setup_.noise, .walk = setup_.walk, .substeps = setup_.substeps};
+  if (memo && !setup_.has_ramps && memo->setup() == same) memo_ = std::move(memo);
 }
 
 void FilterEstimation::reset() noexcept {
@@ -100,7 +107,9 @@ double FilterEstimation::log_likelihood(const KalmanFilter& filter, Measured out
 void FilterEstimation::take(Measured outputs) noexcept {
   for (std::size_t i = 0; i < alive_; ++i) {
     if (alive_ > 1) bank_[i].log_likelihood += log_likelihood(bank_[i].filter, outputs);
-    bank_[i].filter.update(outputs);
+    const std::span given(outputs.values, setup_.noise.output_variances.size());
+    const bool is_known = memo_ && !outputs.weights && memo_->update.take(given, 0.0, bank_[i].filter);
+    if (!is_known) bank_[i].filter.update(outputs);
   }
   if (alive_ == 1) return;
   best_ = 0;
@@ -131,6 +140,8 @@ void FilterEstimation::add(const MeasuredInterval& interval, Measured outputs) n
   }
   for (std::size_t i = 0; i < alive_; ++i) {
     KalmanFilter& filter = bank_[i].filter;
+    const std::span given(interval.inputs, setup_.noise.input_variances.size());
+    if (memo_ && interval.between == 0 && memo_->prediction.take(given, interval.duration, filter)) continue;
     filter.predict(interval, no_input_.data(), setup_.has_ramps ? ramp_variances_.data() : nullptr, nullptr, outputs);
     bank_[i].log_likelihood += filter.between_log_likelihood();
     for (std::size_t j = 0; !setup_.has_ramps && j < setup_.walk.size(); ++j)

@@ -55,9 +55,12 @@ std::string in_words(const Health& health, const std::vector<Sensor>& sensors) {
     separator = "; ";
   };
   add("", health.reasons);
-  for (std::size_t s = 0; s < health.sensors.size(); ++s)
-    add(sensors[s].name, health.sensors[s].reasons,
-        fmt::format(" by about {:.2g} {}", health.sensors[s].offset, sensors[s].unit));
+  for (std::size_t s = 0; s < health.sensors.size(); ++s) {
+    const SensorHealth& sensor = health.sensors[s];
+    std::string offset = fmt::format(" by about {:.2g} {}", sensor.offset, sensors[s].unit);
+    if (sensor.rival >= 0) offset += " from " + sensors[static_cast<std::size_t>(sensor.rival)].name;
+    add(sensors[s].name, sensor.reasons, offset);
+  }
   add("inputs", health.inputs.reasons);
   return text;
 }

@@ -13,6 +13,13 @@ using Root = Eigen::LLT<Innovation::OfSensor<Eigen::Dynamic>>;
 
 double squared_size(const Innovation::OfSensor<1>& value,
                     const Innovation::OfSensor<Eigen::Dynamic>& covariance) noexcept {
+  const Eigen::Index size = value.size();
+  if (size == 1 && covariance(0, 0) > 0.0) return value[0] * value[0] / covariance(0, 0);
+  if (size == 2 && covariance(0, 0) > 0.0) {
+    const double by = covariance(1, 0) / covariance(0, 0), rest = value[1] - by * value[0],
+                 variance = covariance(1, 1) - by * covariance(1, 0);
+    if (variance > 0.0) return value[0] * value[0] / covariance(0, 0) + rest * rest / variance;
+  }
   const Innovation::OfSensor<1> scaled = Root(covariance).matrixL().solve(value);
   return scaled.squaredNorm();
 }

@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <type_traits>
 #include <utility>
 
+#include "numbers.hpp"
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/base/padded.hpp"
 #include "rhec/core/base/with_size.hpp"
@@ -14,6 +16,8 @@
 
 namespace rhec {
 namespace {
+
+constexpr int carried_at_once = 4;  // deviations
 
 /// Those of motion whose measurements are summarised. Polynomials in time would jump with an angle.
 std::vector<int> summarised_outputs(const ModelDescription& about, const KalmanFilter::Noise& noise) {
@@ -43,7 +47,9 @@ KalmanFilter::KalmanFilter(std::shared_ptr<const Model> model, Noise noise, int 
   next_.assign(nx_, 0.0);
   jacobian_.assign(static_cast<std::size_t>(nx_) * (nx_ + nu_ + 2 * np_), 0.0);
   input_.assign(nu_, 0.0);
-  added_.assign(ny_, 0.0);
+  for (auto* v : {&added_, &innovations_, &innovation_variances_}) v->assign(ny_, 0.0);
+  gains_ = Eigen::MatrixXd::Zero(n, ny_);
+  carried_.assign(static_cast<std::size_t>(nx_) * carried_at_once, 0.0);
   is_missing_.assign(nu_, 0);
   const std::size_t width = padded(nx_ + np_ + nu_);
   for (auto* v : {&row_, &next_row_}) v->assign(width, 0.0);
@@ -90,10 +96,18 @@ void KalmanFilter::clip() noexcept {
     mean[nx_ + j] = std::min(std::max(mean[nx_ + j], noise_.parameter_lower[j]), noise_.parameter_upper[j]);
 }
 
-void KalmanFilter::update(Measured y, const double* information_weights) noexcept {
-  if (information_weights) y.weights = information_weights;
+void KalmanFilter::expect() noexcept {
   model_->observe(
       {.count = 1, .states = mean.data(), .outputs = predicted_.data(), .jacobians = output_jacobian_.data()});
+}
+
+void KalmanFilter::update(Measured y, const double* information_weights) noexcept {
+  if (information_weights) y.weights = information_weights;
+  expect();
+  update_as_expected(y);
+}
+
+void KalmanFilter::update_as_expected(Measured y) noexcept {
   std::ranges::fill(added_, 0.0);
   if (std::ranges::any_of(curved_outputs_, [y](int j) { return !std::isnan(y[j]); })) {
     // Once to see where the outputs put the state, then linearised there.
@@ -111,6 +125,7 @@ void KalmanFilter::update(Measured y, const double* information_weights) noexcep
 /// One output after the other, all linearised at the same point; the noises are independent.
 void KalmanFilter::take_outputs(Measured y) noexcept {
   correction_.setZero();
+  std::ranges::fill(innovation_variances_, 0.0);
   for (int j = 0; j < ny_; ++j)
     if (!std::isnan(y[j])) take_output(j, y[j], noise_.output_variances[j] / y.weight(j) + added_[j]);
 }
@@ -170,7 +185,13 @@ void KalmanFilter::take_output(int output, double measured, double variance) noe
     }
     for (int r = 0; r < n; ++r)
       if (zeros[r] != 0.0) return false;
-    for (int r = 0; r < n; ++r) correction_[r] += gain[r] * innovation;
+    double* kept = gains_.col(output).data();
+    for (int r = 0; r < n; ++r) {
+      correction_[r] += gain[r] * innovation;
+      kept[r] = gain[r];
+    }
+    innovations_[output] = innovation;
+    innovation_variances_[output] = total;
     return true;
   });
   if (taken) make_symmetric();
@@ -218,22 +239,24 @@ void KalmanFilter::predict(const double* measured_input, const double* input_gue
     for (int c = 0; c < np_; ++c)
       for (int r = 0; r < nx_; ++r) jacobian_[(nx_ + nu_ + c) * nx_ + r] += jacobian_[(nx_ + nu_ + np_ + c) * nx_ + r];
   with_size(nx_, [&](auto nx) {
-    const auto transition = [&](int column) { return jacobian_.data() + (column < nx ? column : nu_ + column) * nx; };
+    double* transition = jacobian_rows_.data();  // free since the step was differentiated
+    std::copy_n(jacobian_.data(), nx * nx, transition);
+    std::copy_n(jacobian_.data() + (nx_ + nu_) * nx_, np_ * nx, transition + nx * nx);
     const double* P = covariance.data();
-    double* __restrict work = work_.data();
-    double* __restrict next = next_covariance_.data();
+    double* work = work_.data();
+    double* next = next_covariance_.data();
     for (int c = 0; c < n; ++c) {
-      double* moved = work + c * n;
+      double* __restrict moved = work + c * n;
       std::fill_n(moved, nx, 0.0);
       for (int k = 0; k < n; ++k)
-        for (int r = 0; r < nx; ++r) moved[r] += transition(k)[r] * P[c * n + k];
+        for (int r = 0; r < nx; ++r) moved[r] += transition[k * nx + r] * P[c * n + k];
     }
     std::copy_n(P, n * n, next);
     for (int c = 0; c < nx; ++c) {
-      double* column = next + c * n;
+      double* __restrict column = next + c * n;
       std::fill_n(column, nx, 0.0);
       for (int k = 0; k < n; ++k)
-        for (int r = 0; r < nx; ++r) column[r] += work[k * n + r] * transition(k)[c];
+        for (int r = 0; r < nx; ++r) column[r] += work[k * n + r] * transition[k * nx + c];
     }
     for (int c = nx; c < n; ++c)
       for (int r = 0; r < nx; ++r) next[c * n + r] = next[r * n + c] = work[c * n + r];
@@ -255,25 +278,31 @@ void KalmanFilter::predict(const double* measured_input, const double* input_gue
     }
     next_covariance_(nx_ + j, nx_ + j) += variance;
   }
-  const bool finite = std::all_of(next_.begin(), next_.end(), [](double value) { return std::isfinite(value); });
-  if (!finite || !next_covariance_.allFinite()) return;
+  if (!are_finite(next_) || !are_finite(next_covariance_)) return;
   make_symmetric();
   std::copy(next_.begin(), next_.end(), mean.data());
 }
 
-void KalmanFilter::carry(Eigen::MatrixXd& deviations) noexcept {
-  with_size(nx_, [&](auto nx) {
-    double* __restrict moved = correction_.data();
-    for (Eigen::Index m = 0; m < deviations.cols(); ++m) {
-      double* each = deviations.col(m).data();
-      std::fill_n(moved, nx, 0.0);
+void KalmanFilter::carry(Deviations& deviations) noexcept {
+  const auto move = [&](auto count, Eigen::Index first) {
+    using Lanes = Eigen::Array<double, count(), 1>;
+    const Eigen::Index stride = deviations.columns.cols();
+    double* rows = deviations.columns.data() + first;
+    for (int r = 0; r < nx_; ++r) {
+      Lanes sum = Lanes::Zero();
       for (int c = 0; c < nx_ + np_; ++c) {
-        const double* by = jacobian_.data() + (c < nx ? c : nu_ + c) * nx;
-        for (int r = 0; r < nx; ++r) moved[r] += by[r] * each[c];
+        const double by = jacobian_[(c < nx_ ? c : nu_ + c) * nx_ + r];
+        if (by != 0.0) sum += by * Eigen::Map<const Lanes>(rows + c * stride);
       }
-      std::copy_n(moved, nx, each);
+      Eigen::Map<Lanes>(carried_.data() + r * count()) = sum;
     }
-  });
+    for (int r = 0; r < nx_; ++r)
+      Eigen::Map<Lanes>(rows + r * stride) = Eigen::Map<const Lanes>(carried_.data() + r * count());
+  };
+  Eigen::Index first = 0;
+  for (; first + carried_at_once <= deviations.used; first += carried_at_once)
+    move(std::integral_constant<int, carried_at_once>{}, first);
+  for (; first < deviations.used; ++first) move(std::integral_constant<int, 1>{}, first);
 }
 
 /// Next state and its Jacobian for constant parameters, by the faster of the model's functions.

@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "innovation.hpp"
-#include "rhec/core/base/angle.hpp"
 
 namespace rhec {
 
@@ -14,7 +13,13 @@ namespace {
 // An onset begins where an innovation is larger than so many standard deviations, or none is younger than so many
 // samples. Where there are many, one of at least so many samples gives way; the oldest say nothing new.
 constexpr double strange = 2.0;
-constexpr int most_onsets = 8, young = 20, unproven = 10, oldest = 150;
+constexpr int most_onsets = 7, young = 20, unproven = 10, oldest = 150;
+// The difference of two outputs shows at once: so many onsets of it are enough.
+constexpr int onsets_of_rivals = 3;
+// An offset is as probable as none where b^^2 is so many times its variance, and not worth a thought below.
+constexpr double even_odds = 25.0, improbable = 16.0;
+// The probability that it is the other one of two outputs that is off.
+constexpr double rival_is_off = 0.5;
 // What says that an output has always been off is a sum over about so many samples.
 constexpr double memory = 100.0;
 // One innovation counts as no more than so many standard deviations: slip that jumps makes large ones, but few.
@@ -26,44 +31,84 @@ constexpr double negligible = 2.0;
 constexpr double most_certain = 4.0;
 
 /// P + v v' scale, without a temporary.
-void add_square(const Eigen::Ref<const Eigen::VectorXd>& v, double scale, Eigen::MatrixXd& P) noexcept {
+template <class Vector>
+void add_square(const Vector& v, double scale, Eigen::MatrixXd& P) noexcept {
   for (Eigen::Index c = 0; c < v.size(); ++c) P.col(c) += v * (scale * v[c]);
 }
 
 }  // namespace
 
-OffsetWatch::OffsetWatch(const Model& model, std::vector<int> outputs, const KalmanFilter::Noise& noise, double gate)
-    : outputs_(std::move(outputs)),
-      variances_(noise.output_variances),
+OffsetWatch::OffsetWatch(const Model& model, const std::vector<Watched>& outputs, const KalmanFilter::Noise& noise,
+                         double gate)
+    : watched_of_(static_cast<std::size_t>(model.output_count()), -1),
+      position_x_(model.description().roles.position_x),
+      position_y_(model.description().roles.position_y),
       parameter_lower_(noise.parameter_lower),
       parameter_upper_(noise.parameter_upper),
-      limit_(gate * gate) {
-  const Eigen::Index n = model.state_count() + model.parameter_count();
-  for (const Variable& each : model.description().outputs) is_angle_.push_back(each.is_angle);
-  if (!outputs_.empty()) onsets_.resize(outputs_.size() + most_onsets);
-  known_.resize(is_angle_.size());
-  sensitivities_ = Eigen::MatrixXd::Zero(n, std::ssize(onsets_) + std::ssize(outputs_));
-  covariance_ = Eigen::MatrixXd::Zero(n, n);
-  gradient_ = image_ = correction_ = Eigen::VectorXd::Zero(n);
+      limit_(gate * gate),
+      known_(outputs.size()) {
+  int slots = static_cast<int>(outputs.size());
+  const bool has_single = std::ranges::any_of(outputs, [](const Watched& each) { return each.rival < 0; });
+  const int first_shared = slots;
+  if (has_single) slots += most_onsets;
+  for (const Watched& each : outputs) {
+    const bool is_single = each.rival < 0;
+    watched_of_[each.output] = static_cast<int>(outputs_.size());
+    outputs_.push_back(each.output);
+    rivals_.push_back(each.rival);
+    first_slot_.push_back(is_single ? first_shared : slots);
+    slots_.push_back(is_single ? most_onsets : onsets_of_rivals);
+    if (!is_single) slots += onsets_of_rivals;
+  }
+  onsets_.resize(slots);
+  const Eigen::Index n = model.state_count() + model.parameter_count(), needed = lane_of_known(outputs_.size()),
+                     lanes = (needed + block - 1) / block * block;
+  sensitivities_.columns = KalmanFilter::Deviations::Columns::Zero(n, lanes);
+  for (auto* each : {&information_, &score_, &squares_, &count_}) *each = Eigen::ArrayXd::Zero(lanes);
+  is_off_ = Eigen::ArrayXXd::Zero(lanes, model.output_count());
+  for (std::size_t k = 0; k < outputs_.size(); ++k) is_off_(lane_of_known(k), outputs_[k]) = 1.0;
   reset();
 }
 
 void OffsetWatch::reset() noexcept {
-  sensitivities_.setZero();
-  forget_onsets();
   known_.assign(known_.size(), {});
+  sensitivities_.columns.setZero();
+  forget_onsets();
+}
+
+void OffsetWatch::set(int lane, const Constant& constant) noexcept {
+  information_[lane] = constant.information;
+  score_[lane] = constant.score;
+  squares_[lane] = constant.squares;
+  count_[lane] = constant.count;
 }
 
 void OffsetWatch::forget_onsets() noexcept {
-  onsets_.assign(onsets_.size(), {});
-  for (std::size_t k = 0; k < outputs_.size(); ++k) onsets_[k].output = outputs_[k];
+  for (std::size_t m = 0; m < onsets_.size(); ++m) {
+    const bool is_ever = m < outputs_.size();
+    onsets_[m] = {.watched = is_ever ? static_cast<int>(m) : -1, .age = 0};
+    set(static_cast<int>(m), {});
+    is_off_.row(static_cast<Eigen::Index>(m)).setZero();
+    if (is_ever) is_off_(static_cast<Eigen::Index>(m), outputs_[m]) = 1.0;
+  }
   // An offset that has always been there goes on as before.
-  sensitivities_.rightCols(sensitivities_.cols() - std::ssize(outputs_)).setZero();
-  suspect_ = refuted_ = -1;
+  sensitivities_.columns.rightCols(sensitivities_.columns.cols() - std::ssize(outputs_)).setZero();
+  suspect_ = refuted_ = candidate_ = -1;
+  find_used_lanes();
+}
+
+/// Whole blocks of lanes at the end in which nothing is watched are left out.
+void OffsetWatch::find_used_lanes() noexcept {
+  int used = 0;
+  for (std::size_t m = 0; m < onsets_.size(); ++m)
+    if (onsets_[m].watched >= 0) used = static_cast<int>(m) + 1;
+  for (std::size_t k = 0; k < known_.size(); ++k)
+    if (known_[k].is_off) used = lane_of_known(k) + 1;
+  sensitivities_.used = (used + block - 1) / block * block;
 }
 
 void OffsetWatch::correct(double* outputs) const noexcept {
-  for (const int j : outputs_) outputs[j] -= known_[j].value;
+  for (std::size_t k = 0; k < outputs_.size(); ++k) outputs[outputs_[k]] -= known_[k].value;
 }
 
 bool OffsetWatch::has_any() const noexcept {
@@ -72,13 +117,14 @@ bool OffsetWatch::has_any() const noexcept {
 
 bool OffsetWatch::Known::is_recent() const noexcept { return is_off && age <= oldest; }
 
-bool OffsetWatch::Known::is_significant() const noexcept {
-  const double total = value + error.value();
-  return total * total * error.information > negligible * negligible;
-}
-
 bool OffsetWatch::has_recent() const noexcept {
   return std::ranges::any_of(known_, [](const Known& each) { return each.is_recent(); });
+}
+
+bool OffsetWatch::is_significant(std::size_t watched) const noexcept {
+  const Constant error = constant(lane_of_known(watched));
+  const double total = known_[watched].value + error.value();
+  return total * total * error.information > negligible * negligible;
 }
 
 void OffsetWatch::clip(Eigen::VectorXd::SegmentReturnType parameters) const noexcept {
@@ -86,41 +132,67 @@ void OffsetWatch::clip(Eigen::VectorXd::SegmentReturnType parameters) const noex
     parameters[j] = std::min(std::max(parameters[j], parameter_lower_[j]), parameter_upper_[j]);
 }
 
-/// Where there is no room, the onset gives way that explains the least.
-void OffsetWatch::begin(int output) noexcept {
-  std::size_t least = onsets_.size();
-  const auto worth = [](const Onset& each) {
-    return each.output < 0 || each.age > oldest ? -1.0 : each.offset.explained();
-  };
-  for (std::size_t m = outputs_.size(); m < onsets_.size(); ++m) {
-    const bool may_go = onsets_[m].output < 0 || onsets_[m].age >= unproven;
-    if (may_go && (least == onsets_.size() || worth(onsets_[m]) < worth(onsets_[least]))) least = m;
-  }
-  if (least == onsets_.size()) return;
-  onsets_[least] = {.output = output, .age = 0, .offset = {}};
-  sensitivities_.col(static_cast<Eigen::Index>(least)).setZero();
+bool OffsetWatch::has_young(int watched) const noexcept {
+  const auto first = onsets_.begin() + first_slot_[watched];
+  return std::any_of(first, first + slots_[watched],
+                     [&](const Onset& each) { return each.watched == watched && each.age < young; });
 }
 
-/// What the output that is being taken says of a constant by which one is off.
-void OffsetWatch::note(int output, Constant& constant, Eigen::Index column, int off) noexcept {
-  auto sensitivity = sensitivities_.col(column);
-  const double most = most_counted * std::sqrt(variance_), counted = std::min(std::max(innovation_, -most), most);
-  const double g = (output == off ? 1.0 : 0.0) - gradient_.dot(sensitivity);
-  constant.information += g * g / variance_;
-  constant.score += g * counted / variance_;
-  constant.squares += counted * counted / variance_;
-  constant.count += 1.0;
-  sensitivity += image_ * (g / variance_);
+/// Where there is no room, the onset gives way that explains the least; the one that explains the most stays.
+void OffsetWatch::begin(int watched, double excess) noexcept {
+  std::size_t least = onsets_.size();
+  const auto worth = [this](std::size_t m) {
+    return onsets_[m].watched < 0 || onsets_[m].age > oldest ? -1.0 : constant(static_cast<int>(m)).explained();
+  };
+  const auto first = static_cast<std::size_t>(first_slot_[watched]), end = first + slots_[watched];
+  std::size_t best = first;
+  for (std::size_t m = first + 1; m < end; ++m)
+    if (worth(m) > worth(best)) best = m;
+  for (std::size_t m = first; m < end; ++m) {
+    const bool is_proven = m == best && worth(m) > improbable;
+    const bool may_go = onsets_[m].watched < 0 || (onsets_[m].age >= unproven && !is_proven);
+    if (may_go && (least == onsets_.size() || worth(m) < worth(least))) least = m;
+  }
+  if (least == onsets_.size()) return;
+  const auto lane = static_cast<Eigen::Index>(least);
+  onsets_[least] = {.watched = watched, .age = 0, .excess = excess};
+  set(static_cast<int>(least), {});
+  is_off_.row(lane).setZero();
+  is_off_(lane, outputs_[watched]) = 1.0;
+  sensitivities_.columns.col(lane).setZero();
+  find_used_lanes();
+}
+
+/// What an output that has been used says of all constants.
+void OffsetWatch::note(const WalkingFilter& filter, int output, const KalmanFilter::Use& use) noexcept {
+  const int n = static_cast<int>(sensitivities_.columns.rows()), nx = filter.model().state_count();
+  const double most = most_counted * std::sqrt(use.variance), inverse = 1.0 / use.variance,
+               counted = std::min(std::max(use.innovation, -most), most), square = counted * counted * inverse;
+  const auto at = [](auto& array, Eigen::Index first) { return array.template segment<block>(first); };
+  for (Eigen::Index first = 0; first < sensitivities_.used; first += block) {
+    const auto sensitivity = [&](Eigen::Index r) {
+      return sensitivities_.columns.row(r).template segment<block>(first).transpose().array();
+    };
+    Lanes g = is_off_.col(output).segment<block>(first);
+    for (int c = 0; c < nx; ++c)
+      if (const double by = filter.derivative(output, c); by != 0.0) g -= by * sensitivity(c);
+    const Lanes weighted = g * inverse;
+    at(information_, first) += g * weighted;
+    at(score_, first) += counted * weighted;
+    at(squares_, first) += square;
+    at(count_, first) += 1.0;
+    for (int r = 0; r < n; ++r) sensitivity(r) += use.gain[r] * g;
+  }
 }
 
 void OffsetWatch::widen(const WalkingFilter& filter, const Sensor& sensor, const double* outputs,
                         Innovation& innovation) noexcept {
   bool is_wider = false;
   for (std::size_t k = 0; k < outputs_.size(); ++k) {
-    const Known& known = known_[outputs_[k]];
-    if (!known.is_off) continue;
+    if (!known_[k].is_off) continue;
     is_wider = true;
-    const auto sensitivity = sensitivities_.col(std::ssize(onsets_) + static_cast<Eigen::Index>(k));
+    const auto sensitivity = sensitivities_.columns.col(lane_of_known(k));
+    const Constant error = constant(lane_of_known(k));
     Innovation::OfSensor<1> by_offset(innovation.value.size());
     Eigen::Index a = 0;
     for (const int j : sensor.outputs) {
@@ -129,87 +201,85 @@ void OffsetWatch::widen(const WalkingFilter& filter, const Sensor& sensor, const
       for (int c = 0; c < filter.model().state_count(); ++c) g -= filter.derivative(j, c) * sensitivity[c];
       by_offset[a++] = g;
     }
-    innovation.value -= by_offset * known.error.value();
-    innovation.covariance += by_offset * by_offset.transpose() / known.error.information;
+    innovation.value -= by_offset * error.value();
+    innovation.covariance += by_offset * by_offset.transpose() / error.information;
   }
   if (is_wider) innovation.nis = squared_size(innovation.value, innovation.covariance);
 }
 
-/// One output after the other, as the filter does it: innovations of a sample are then independent.
-void OffsetWatch::take(const WalkingFilter& filter, Measured outputs, double excess) noexcept {
+/// One output after the other, as the filter has done it: innovations of a sample are then independent.
+void OffsetWatch::take(const WalkingFilter& filter, double excess) noexcept {
   if (outputs_.empty()) return;
-  const int nx = filter.model().state_count(), ny = filter.model().output_count();
-  covariance_ = filter.covariance();
-  correction_.setZero();
-  gradient_.setZero();
-  for (std::size_t k = 0; k < outputs_.size(); ++k) onsets_[k].offset.fade(1.0 - 1.0 / memory);
-  for (int j = 0; j < ny; ++j) {
-    if (std::isnan(outputs[j])) continue;
-    image_.setZero();
-    for (int c = 0; c < nx; ++c) {
-      gradient_[c] = filter.derivative(j, c);
-      if (gradient_[c] != 0.0) image_ += covariance_.col(c) * gradient_[c];
-    }
-    variance_ = variances_[j] / outputs.weight(j) + gradient_.dot(image_);
-    const double error =
-        is_angle_[j] ? angle_difference(outputs[j], filter.expected(j)) : outputs[j] - filter.expected(j);
-    innovation_ = error - gradient_.dot(correction_);
-    if (!(variance_ > 0.0) || !std::isfinite(innovation_)) continue;
-    if (std::ranges::find(outputs_, j) != outputs_.end()) {
-      const bool is_any_young = std::any_of(onsets_.begin() + std::ssize(outputs_), onsets_.end(),
-                                            [j](const Onset& each) { return each.output == j && each.age < young; });
-      if (!is_any_young || innovation_ * innovation_ > strange * strange * variance_) begin(j);
-    }
-    for (std::size_t m = 0; m < onsets_.size(); ++m)
-      if (onsets_[m].output >= 0) note(j, onsets_[m].offset, static_cast<Eigen::Index>(m), onsets_[m].output);
-    for (std::size_t k = 0; k < outputs_.size(); ++k)
-      if (Known& known = known_[outputs_[k]]; known.is_off)
-        note(j, known.error, std::ssize(onsets_) + static_cast<Eigen::Index>(k), outputs_[k]);
-    correction_ += image_ * (innovation_ / variance_);
-    add_square(image_, -1.0 / variance_, covariance_);
-  }
-  suspect_ = refuted_ = -1;
-  double most = excess * limit_;
+  const double kept = 1.0 - 1.0 / memory;
   for (std::size_t k = 0; k < outputs_.size(); ++k) {
-    Known& known = known_[outputs_[k]];
-    ++known.age;
-    if (known.is_off && !known.is_significant()) refuted_ = static_cast<int>(k);
+    const int ever = static_cast<int>(k);
+    const Constant all = constant(ever);
+    set(ever, {kept * all.information, kept * all.score, kept * all.squares, kept * all.count});
   }
+  for (int j = 0; j < filter.model().output_count(); ++j) {
+    const KalmanFilter::Use use = filter.use(j);
+    if (!(use.variance > 0.0)) continue;
+    const bool is_strange = use.innovation * use.innovation > strange * strange * use.variance;
+    if (const int k = watched_of_[j]; k >= 0 && (is_strange || !has_young(k))) begin(k, excess);
+    note(filter, j, use);
+  }
+  suspect_ = refuted_ = candidate_ = -1;
+  for (std::size_t k = 0; k < known_.size(); ++k) {
+    Known& known = known_[k];
+    ++known.age;
+    if (!known.is_off) continue;
+    if (!is_significant(k)) refuted_ = static_cast<int>(k);
+    if (rivals_[k] < 0) continue;
+    known.by_x = filter.derivative(outputs_[k], position_x_);
+    known.by_y = filter.derivative(outputs_[k], position_y_);
+  }
+  double most = improbable;
   for (std::size_t m = 0; m < onsets_.size(); ++m) {
     Onset& each = onsets_[m];
-    if (each.output < 0) continue;
+    if (each.watched < 0) continue;
     ++each.age;
-    if (std::isnan(outputs[each.output]) || !(each.offset.significance() > most)) continue;
-    most = each.offset.significance();
-    suspect_ = static_cast<int>(m);
+    // What an offset does is in the excess, too, but not before it began.
+    const double usual = m < outputs_.size() ? excess : std::min(excess, each.excess);
+    const int lane = static_cast<int>(m);
+    // None is more significant than what it explains.
+    if (!(score_[lane] * score_[lane] > most * usual * information_[lane])) continue;
+    const double significance = constant(lane).significance() / usual;
+    if (!(significance > most)) continue;
+    most = significance;
+    candidate_ = lane;
   }
+  if (candidate_ < 0) return;
+  const bool is_measured = filter.use(outputs_[onsets_[candidate_].watched]).variance > 0.0;
+  if (is_measured && most > limit_) suspect_ = candidate_;
+  probability_ = 1.0 / (1.0 + std::exp(0.5 * (even_odds - most)));
 }
 
 void OffsetWatch::adopt_suspected(WalkingFilter& filter) noexcept {
-  if (refuted_ >= 0) return withdraw(refuted_, filter);
-  const Onset found = onsets_[suspect_];
-  const auto sensitivity = sensitivities_.col(suspect_);
-  filter.mean() -= sensitivity * found.offset.value();
+  if (refuted_ >= 0) return withdraw(static_cast<std::size_t>(refuted_), filter);
+  const Constant found = constant(suspect_);
+  const auto sensitivity = sensitivities_.columns.col(suspect_);
+  filter.mean() -= sensitivity * found.value();
   clip(filter.mean().tail(std::ssize(parameter_lower_)));
-  add_square(sensitivity, 1.0 / found.offset.information, filter.covariance());
-  const double least = found.offset.value() / most_certain;
-  adopt(found.output, found.offset.value(), std::max(1.0 / found.offset.information, least * least));
+  add_square(sensitivity, 1.0 / found.information, filter.covariance());
+  const double least = found.value() / most_certain;
+  adopt(outputs_[onsets_[suspect_].watched], found.value(), std::max(1.0 / found.information, least * least));
 }
 
 void OffsetWatch::adopt(int output, double change, double variance) noexcept {
-  Known& known = known_[output];
+  const auto k = static_cast<std::size_t>(watched_of_[output]);
+  Known& known = known_[k];
   known.value += change;
   known.age = 0;
-  known.error = {.information = 1.0 / variance, .score = 0.0, .squares = 0.0, .count = 0.0};
+  set(lane_of_known(k), {.information = 1.0 / variance, .score = 0.0, .squares = 0.0, .count = 0.0});
   known.is_off = known.value * known.value > negligible * negligible * variance;
   if (!known.is_off) known = {};
   forget_onsets();
 }
 
 /// An offset that was adopted is none.
-void OffsetWatch::withdraw(int watched, WalkingFilter& filter) noexcept {
-  Known& known = known_[outputs_[watched]];
-  const auto sensitivity = sensitivities_.col(watched);
+void OffsetWatch::withdraw(std::size_t watched, WalkingFilter& filter) noexcept {
+  Known& known = known_[watched];
+  const auto sensitivity = sensitivities_.columns.col(lane_of_known(watched));
   filter.mean() += sensitivity * known.value;
   clip(filter.mean().tail(std::ssize(parameter_lower_)));
   add_square(sensitivity, known.value * known.value, filter.covariance());
@@ -218,21 +288,34 @@ void OffsetWatch::withdraw(int watched, WalkingFilter& filter) noexcept {
 }
 
 void OffsetWatch::withdraw_recent(WalkingFilter& filter) noexcept {
-  for (std::size_t k = 0; k < outputs_.size(); ++k)
-    if (known_[outputs_[k]].is_recent()) withdraw(static_cast<int>(k), filter);
+  for (std::size_t k = 0; k < known_.size(); ++k)
+    if (known_[k].is_recent()) withdraw(k, filter);
 }
 
 void OffsetWatch::refine(Estimate& estimate) const noexcept {
   const Eigen::Index nx = estimate.state.size(), np = estimate.parameters.size();
   if (estimate.covariance.rows() != nx + np) return;
-  for (std::size_t k = 0; k < outputs_.size(); ++k) {
-    const Known& known = known_[outputs_[k]];
-    if (!known.is_off) continue;
-    const auto sensitivity = sensitivities_.col(std::ssize(onsets_) + static_cast<Eigen::Index>(k));
-    estimate.state -= sensitivity.head(nx) * known.error.value();
-    estimate.parameters -= sensitivity.tail(np) * known.error.value();
+  if (candidate_ >= 0) {
+    const Constant offset = constant(candidate_);
+    const double square = offset.value() * offset.value() + 1.0 / offset.information;
+    add_square(sensitivities_.columns.col(candidate_), probability_ * square, estimate.covariance);
+  }
+  for (std::size_t k = 0; k < known_.size(); ++k) {
+    if (!known_[k].is_off) continue;
+    const auto sensitivity = sensitivities_.columns.col(lane_of_known(k));
+    const Constant error = constant(lane_of_known(k));
+    estimate.state -= sensitivity.head(nx) * error.value();
+    estimate.parameters -= sensitivity.tail(np) * error.value();
     clip(estimate.parameters.head(np));
-    add_square(sensitivity, 1.0 / known.error.information, estimate.covariance);
+    add_square(sensitivity, 1.0 / error.information, estimate.covariance);
+    if (rivals_[k] < 0) continue;
+    // If the other one is off, the vehicle is where this one says.
+    const double squared = known_[k].by_x * known_[k].by_x + known_[k].by_y * known_[k].by_y;
+    if (!(squared > 0.0)) continue;
+    const double shift = (known_[k].value + error.value()) / squared, by[] = {known_[k].by_x, known_[k].by_y};
+    const int at[] = {position_x_, position_y_};
+    for (int r = 0; r < 2; ++r)
+      for (int c = 0; c < 2; ++c) estimate.covariance(at[r], at[c]) += rival_is_off * (shift * by[r]) * (shift * by[c]);
   }
 }
 

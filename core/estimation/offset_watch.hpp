@@ -23,8 +23,14 @@ namespace rhec {
 /// Allocates in its constructor only.
 class OffsetWatch {
  public:
-  /// `outputs`: those that are watched; `gate`: standard deviations by which an offset has to differ from none.
-  OffsetWatch(const Model& model, std::vector<int> outputs, const KalmanFilter::Noise& noise, double gate);
+  struct Watched {
+    int output = 0;
+    /// Another output of the position, of another device, that measures the same: only their difference is known, and
+    /// which of the two is off is not. -1: none, the output is not one of the position.
+    int rival = -1;
+  };
+  /// `gate`: standard deviations by which an offset has to differ from none.
+  OffsetWatch(const Model& model, const std::vector<Watched>& outputs, const KalmanFilter::Noise& noise, double gate);
 
   void reset() noexcept;
   /// The estimate has jumped: what offsets have done to it is not known any more.
@@ -32,16 +38,16 @@ class OffsetWatch {
 
   /// Takes offsets that are known out of outputs (n_y).
   void correct(double* outputs) const noexcept;
-  /// Columns that go along with the filter's predictions (`WalkingFilter::predict`).
-  Eigen::MatrixXd& sensitivities() noexcept { return sensitivities_; }
+  /// What goes along with the filter's predictions (`WalkingFilter::predict`).
+  KalmanFilter::Deviations& sensitivities() noexcept { return sensitivities_; }
   /// What is not known of offsets that were adopted makes an innovation of a sensor's outputs (n_y) wider.
   void widen(const WalkingFilter& filter, const Sensor& sensor, const double* outputs, Innovation& innovation) noexcept;
-  /// What the filter is about to use of the outputs, after `expect`. `excess`: squares of innovations have been so many
-  /// times what was expected.
-  void take(const WalkingFilter& filter, Measured outputs, double excess) noexcept;
+  /// What the filter has just used of the outputs. `excess`: squares of innovations have been so many times what was
+  /// expected.
+  void take(const WalkingFilter& filter, double excess) noexcept;
   /// Whether innovations say that an output is off, or has come back.
   bool has_suspect() const noexcept { return suspect_ >= 0 || refuted_ >= 0; }
-  /// Adopts that offset; the filter, after its update, becomes what it would be without it.
+  /// Adopts that offset; the filter becomes what it would be without it.
   void adopt_suspected(WalkingFilter& filter) noexcept;
   /// Adopts that the offset of an output has changed by this much, known with a variance.
   void adopt(int output, double change, double variance) noexcept;
@@ -51,14 +57,28 @@ class OffsetWatch {
   void withdraw_recent(WalkingFilter& filter) noexcept;
 
   /// What an output is off by; 0 if it is right.
-  double offset(int output) const noexcept { return known_[static_cast<std::size_t>(output)].value; }
+  double offset(int output) const noexcept {
+    const int k = watched_of_[static_cast<std::size_t>(output)];
+    return k < 0 ? 0.0 : known_[static_cast<std::size_t>(k)].value;
+  }
+  /// The output that says otherwise, where it is not known which of the two is off; -1: none.
+  int rival(int output) const noexcept {
+    const int k = watched_of_[static_cast<std::size_t>(output)];
+    return k < 0 ? -1 : rivals_[static_cast<std::size_t>(k)];
+  }
   bool has_any() const noexcept;
+  /// Whether estimates are to be refined: there is one, or one is not improbable.
+  bool is_in_doubt() const noexcept { return candidate_ >= 0 || has_any(); }
   bool has_recent() const noexcept;  ///< one that was adopted of late
   /// Gives an estimate of [x; p] the mean and the covariance that it has if offsets are not known better than they are.
+  /// One that is not adopted yet, and the other one of two outputs of which one is off, count with their probability:
+  /// the mean stays, and the covariance is the second moment of both answers about it.
   void refine(Estimate& estimate) const noexcept;
 
  private:
-  /// What has been learnt of a constant.
+  static constexpr int block = 4;  ///< of lanes that are calculated together
+  using Lanes = Eigen::Array<double, block, 1>;
+  /// What has been learnt of a constant that an output is off by.
   struct Constant {
     double information = 0.0, score = 0.0;
     double squares = 0.0, count = 0.0;  ///< of innovations, relative to their variances
@@ -68,38 +88,47 @@ class OffsetWatch {
     double significance() const noexcept {
       return explained() / std::max(1.0, (squares - explained()) / std::max(1.0, count - 1.0));
     }
-    void fade(double share) noexcept { information *= share, score *= share, squares *= share, count *= share; }
   };
   struct Onset {
-    int output = -1;  ///< -1: none
-    int age = 0;      ///< [samples]
-    Constant offset = {};
+    int watched = -1;     ///< -1: none
+    int age = 0;          ///< [samples]
+    double excess = 1.0;  ///< of innovations when it began
   };
   struct Known {
     bool is_recent() const noexcept;
-    bool is_significant() const noexcept;
     bool is_off = false;
     int age = 0;  ///< [samples]
     double value = 0.0;
-    Constant error;  ///< of the value, to be added to it
+    double by_x = 0.0, by_y = 0.0;  ///< derivatives of the output by the position
   };
-  void begin(int output) noexcept;
-  void note(int output, Constant& constant, Eigen::Index column, int off) noexcept;
-  void withdraw(int watched, WalkingFilter& filter) noexcept;
+  int lane_of_known(std::size_t watched) const noexcept { return static_cast<int>(onsets_.size() + watched); }
+  Constant constant(int lane) const noexcept {
+    return {information_[lane], score_[lane], squares_[lane], count_[lane]};
+  }
+  void set(int lane, const Constant& constant) noexcept;
+  void begin(int watched, double excess) noexcept;
+  bool has_young(int watched) const noexcept;
+  void note(const WalkingFilter& filter, int output, const KalmanFilter::Use& use) noexcept;
+  bool is_significant(std::size_t watched) const noexcept;
+  void withdraw(std::size_t watched, WalkingFilter& filter) noexcept;
+  void find_used_lanes() noexcept;
   void clip(Eigen::VectorXd::SegmentReturnType parameters) const noexcept;
 
-  std::vector<int> outputs_;
-  std::vector<double> variances_, parameter_lower_, parameter_upper_;
-  std::vector<bool> is_angle_;
+  std::vector<int> outputs_, rivals_;    ///< that are watched
+  std::vector<int> first_slot_, slots_;  ///< by watched output, its places for onsets
+  std::vector<int> watched_of_;          ///< by output, which of these it is; -1: none
+  int position_x_, position_y_;          ///< states
+  std::vector<double> parameter_lower_, parameter_upper_;
   double limit_;
   std::vector<Onset> onsets_;  ///< first those of offsets that have been there for ever, one for each watched output
-  std::vector<Known> known_;   ///< by output
-  Eigen::MatrixXd sensitivities_;    ///< V, n rows: of onsets, and then of outputs that are watched
+  std::vector<Known> known_;   ///< by watched output; what is not known of its value is to be added to it
+  // Lanes: those of onsets, and then of what is known of watched outputs.
+  KalmanFilter::Deviations sensitivities_;  ///< V
+  Eigen::ArrayXd information_, score_, squares_, count_;
+  Eigen::ArrayXXd is_off_;           ///< 1 in lanes of an output, by output
   int suspect_ = -1, refuted_ = -1;  ///< an onset; a watched output whose offset is none after all
-  // Of the output that is being taken:
-  Eigen::MatrixXd covariance_;
-  Eigen::VectorXd gradient_, image_, correction_;
-  double innovation_ = 0.0, variance_ = 0.0;
+  int candidate_ = -1;               ///< an onset that has not said enough yet
+  double probability_ = 0.0;         ///< that this one is right
 };
 
 }  // namespace rhec

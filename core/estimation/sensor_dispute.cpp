@@ -23,6 +23,10 @@ constexpr double left_unexplained = 0.5;
 constexpr double convincing = 4.6;
 // Samples of a dispute within which slip may have jumped.
 constexpr int fresh = 2;
+// Slip that would be beyond its bounds by so many standard deviations has not jumped.
+constexpr double impossible = 3.0;
+// With more than this probability what is disputed is slip that has jumped.
+constexpr double probable = 0.9;
 // Slip that has jumped within an interval displaces the vehicle by at least this share of it on the next one again.
 constexpr double goes_on_by = 0.8;
 // A hypothesis that has explained so many samples in a row has learnt how the vehicle moves.
@@ -147,7 +151,7 @@ void SensorWatch::confront(Hypothesis& hypothesis, const double* outputs, bool c
     refute(hypothesis);
     return;
   }
-  hypothesis.filter.update(weighed(outputs));
+  hypothesis.filter.update_as_expected(weighed(outputs));
   hypothesis.explained += counts;
 }
 
@@ -193,6 +197,7 @@ bool SensorWatch::may_follow() const noexcept {
 /// The log likelihood of slip that has jumped just now; NaN if it has not.
 double SensorWatch::consider_slip() noexcept {
   const bool is_new = !slip_->is_active;
+  const auto slip_beyond = [&] { return Memory::slip_beyond(slip_->filter, memory_->before_slip, setup_.noise); };
   double new_likelihood = Memory::unknown;
   if (is_new) {
     start(*slip_);
@@ -204,11 +209,15 @@ double SensorWatch::consider_slip() noexcept {
     if (disputed_samples_ <= fresh) new_likelihood = likelihood(slip_->filter, true);
   } else if (!fits(slip_->filter, raw_.data()) && goes_on()) {
     go_on_from(edge_->filter, slip_->filter);
+    copy_numbers(slip_->filter.mean(), memory_->before_slip);
     slip_->filter.update(weighed(raw_.data()));
+    memory_->is_slip_possible = slip_beyond() < impossible;
     edge_->is_active = false;
     return new_likelihood;
   }
+  copy_numbers(slip_->filter.mean(), memory_->before_slip);
   confront(*slip_, raw_.data(), true);
+  memory_->is_slip_possible = slip_->is_active && slip_beyond() < impossible;
   begin_edge(is_new);
   return new_likelihood;
 }
@@ -226,7 +235,7 @@ void SensorWatch::consider_moved(double likelihood_of_new_slip) noexcept {
 }
 
 SensorWatch::Finding SensorWatch::settle(double time, const double* outputs) noexcept {
-  if (!is_disputed_) memory_->was_calm = calm_samples_ >= setup_.calm;
+  if (!is_disputed_) memory_->was_calm = std::min(calm_samples_, memory_->undisputed_samples) >= setup_.calm;
   is_disputed_ = true;
   ++disputed_samples_;
   for (std::size_t s = 0; s < sensors_.size() && disputed_samples_ == 1; ++s)
@@ -300,20 +309,32 @@ bool SensorWatch::is_within_bounds(const WalkingFilter& filter) const noexcept {
   return is_within;
 }
 
+/// Whether what is disputed is rather slip that has jumped, which the next sample tells. Until then what is given out
+/// has the covariance of both answers, so that it agrees with what the sensors say: nothing is wrong with it.
+bool SensorWatch::is_probably_slip() const noexcept {
+  return is_disputed_ && disputed_samples_ <= fresh && slip_->is_active && slip_probability_ > probable &&
+         memory_->was_calm && memory_->is_slip_possible && is_within_bounds(own_->filter);
+}
+
 /// What was held back, and what was rejected last, is right after all.
 void SensorWatch::acquit(const double* outputs) noexcept {
+  // Slip at a bound may well be beyond it, as that of wheels that spin on the spot.
+  const bool is_doubtful = !memory_->was_calm || !is_within_bounds(own_->filter);
   const auto take_back = [&](auto&& was_rejected) {
     for (std::size_t s = 0; s < sensors_.size(); ++s) {
       if (std::ranges::none_of(sensors_[s].outputs, was_rejected)) continue;
       --states_[s].rejected;
       ++states_[s].accepted;
+      if (is_doubtful) states_[s].reasons |= reason::rejected, quiet_[s] = 0;
     }
   };
   for (int i = 0; i < held_count_; ++i) take_back([&](int j) { return !std::isnan(held_[i].outputs[j]); });
   take_back([&](int j) { return std::isnan(outputs[j]) && !std::isnan(raw_[j]); });
   for (std::uint32_t& each : findings_) each &= ~reason::rejected;
-  // Slip at a bound may well be beyond it, as that of wheels that spin on the spot.
-  if (!memory_->was_calm || !is_within_bounds(own_->filter)) return;
+  if (is_doubtful) {
+    calm_samples_ = 0;
+    return;
+  }
   for (std::size_t s = 0; s < sensors_.size(); ++s) {
     states_[s].reasons &= ~reason::rejected;
     quiet_[s] = setup_.calm;

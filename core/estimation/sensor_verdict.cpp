@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "numbers.hpp"
 #include "rhec/core/base/angle.hpp"
 #include "sensor_watch_parts.hpp"
 
@@ -50,7 +51,7 @@ void SensorWatch::follow(const Estimate& estimate) noexcept {
   const Model& model = own_->filter.model();
   const Eigen::Index nx = model.state_count(), np = model.parameter_count(), n = nx + np;
   if (estimate.state.size() != nx || estimate.parameters.size() != np || estimate.covariance.rows() != n) return;
-  if (!estimate.state.allFinite() || !estimate.parameters.allFinite() || !estimate.covariance.allFinite()) return;
+  if (!are_finite(estimate.state) || !are_finite(estimate.parameters) || !are_finite(estimate.covariance)) return;
   const int heading = model.description().roles.heading;
   if (!is_active_) {
     if (!(estimate.covariance.diagonal().maxCoeff() > 0.0)) return;  // of one that is not estimated
@@ -61,10 +62,10 @@ void SensorWatch::follow(const Estimate& estimate) noexcept {
   if (is_blind_ || is_searching()) return;
   own_->filter.mean().head(nx) = estimate.state;
   own_->filter.mean().tail(np) = estimate.parameters;
-  own_->filter.covariance() = estimate.covariance;
+  copy_numbers(estimate.covariance, own_->filter.covariance());
 }
 
-bool SensorWatch::is_in_doubt() const noexcept { return slip_probability_ > 0.0 || memory_->offsets->has_any(); }
+bool SensorWatch::is_in_doubt() const noexcept { return slip_probability_ > 0.0 || memory_->offsets->is_in_doubt(); }
 
 void SensorWatch::widen(Estimate& estimate) noexcept {
   memory_->offsets->refine(estimate);

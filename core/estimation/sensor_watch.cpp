@@ -36,6 +36,41 @@ constexpr double most_excess = 100.0, excess_memory = 500.0;
 // Standard deviations by which a sensor has to be off, in the sum of many samples. It is tested at every one of them,
 // with all times since when it may be so.
 constexpr double offset_gate = 7.5;
+// Slip at its bound, of which measurements ask for more by this many of its standard deviations in all, beside so many
+// a sample, does not explain how the vehicle moves.
+constexpr double impossibly_beyond = 4.0, usually_beyond = 0.75;
+
+int sensor_of(int output, const std::vector<Sensor>& sensors) noexcept {
+  for (std::size_t s = 0; s < sensors.size(); ++s)
+    if (std::ranges::find(sensors[s].outputs, output) != sensors[s].outputs.end()) return static_cast<int>(s);
+  return -1;
+}
+
+/// The outputs of which offsets show, by what a filter expects. Where the vehicle is, the offset of one output does
+/// not; of several that measure the same, the differences to the best one do.
+std::vector<OffsetWatch::Watched> watched_outputs(const WalkingFilter& filter, const std::vector<double>& variances) {
+  std::vector<OffsetWatch::Watched> watched;
+  const std::vector<Variable>& about = filter.model().description().outputs;
+  const Roles& roles = filter.model().description().roles;
+  const auto derivative = [&](int output, int state) { return state < 0 ? 0.0 : filter.derivative(output, state); };
+  const auto by_x = [&](int output) { return derivative(output, roles.position_x); };
+  const auto by_y = [&](int output) { return derivative(output, roles.position_y); };
+  const int count = static_cast<int>(about.size());
+  for (int j = 0; j < count; ++j) {
+    if (by_x(j) == 0.0 && by_y(j) == 0.0) {
+      watched.push_back({.output = j});
+      continue;
+    }
+    int best = j;
+    for (int k = 0; k < count; ++k) {
+      const bool is_same = about[j].device != about[k].device && by_x(j) == by_x(k) && by_y(j) == by_y(k);
+      const bool is_better = variances[k] < variances[best] || (variances[k] == variances[best] && k < best);
+      if (is_same && is_better) best = k;
+    }
+    if (best != j) watched.push_back({.output = j, .rival = best});
+  }
+  return watched;
+}
 
 WalkingFilter::Setup filter_setup(const SensorWatch::Setup& setup) {
   return {.noise = setup.noise,
@@ -78,10 +113,9 @@ SensorWatch::SensorWatch(std::shared_ptr<const Model> model, const Setup& setup)
   memory_ = std::make_unique<Memory>();
   memory_->stuck = StuckValues(setup_.noise.output_variances);
   memory_->trial = std::make_unique<WalkingFilter>(model, filter_setup(setup_));
-  std::vector<int> watched;  // where the vehicle is, an offset does not show
   own_->filter.expect();
-  for (int j = 0; j < model->output_count(); ++j)
-    if (setup_.offsets && !sees_position(j)) watched.push_back(j);
+  std::vector<OffsetWatch::Watched> watched;
+  if (setup_.offsets) watched = watched_outputs(own_->filter, setup_.noise.output_variances);
   memory_->offsets = std::make_unique<OffsetWatch>(*model, watched, setup_.noise, offset_gate);
   if (model->description().roles.heading >= 0)
     for (auto* each : {&memory_->search, &memory_->second_thought})
@@ -89,8 +123,8 @@ SensorWatch::SensorWatch(std::shared_ptr<const Model> model, const Setup& setup)
   const Eigen::Index n = own_->filter.mean().size();
   memory_->before_mean = Eigen::VectorXd::Zero(n);
   memory_->before_covariance = Eigen::MatrixXd::Zero(n, n);
-  memory_->away = Eigen::VectorXd::Zero(n);
-  memory_->factor = Eigen::LLT<Eigen::MatrixXd>(n);
+  memory_->away = memory_->before_update = memory_->before_slip = memory_->before_mean;
+  memory_->factor = memory_->before_covariance;
   for (Memory::Entry& entry : memory_->entries) {
     entry.mean = memory_->before_mean;
     entry.covariance = memory_->before_covariance;
@@ -107,6 +141,8 @@ SensorWatch::SensorWatch(std::shared_ptr<const Model> model, const Setup& setup)
 }
 
 SensorWatch::~SensorWatch() = default;
+
+std::shared_ptr<const FilterMemo> SensorWatch::make_memo() { return own_->filter.make_memo(); }
 
 const Eigen::VectorXd& SensorWatch::mean() const noexcept { return own_->filter.mean(); }
 const Eigen::MatrixXd& SensorWatch::covariance() const noexcept { return own_->filter.covariance(); }
@@ -132,6 +168,9 @@ void SensorWatch::reset() noexcept {
   memory_->has_advanced = false;
   memory_->offsets->reset();
   memory_->stuck.reset();
+  memory_->beyond_bounds = 0.0;
+  memory_->was_open = false;
+  memory_->undisputed_samples = setup_.calm;
   std::fill(believed_input_.begin(), believed_input_.end(), 0.0);
 }
 
@@ -205,8 +244,8 @@ void SensorWatch::advance(double duration, const double* inputs, const double* m
 void SensorWatch::note_motion(double duration, const double* inputs) noexcept {
   Memory& memory = *memory_;
   if (!std::exchange(memory.has_advanced, true)) {
-    memory.before_mean = own_->filter.mean();
-    memory.before_covariance = own_->filter.covariance();
+    copy_numbers(own_->filter.mean(), memory.before_mean);
+    copy_numbers(own_->filter.covariance(), memory.before_covariance);
     memory.duration = 0.0;
     std::fill(input_.begin(), input_.end(), Memory::unknown);
   }
@@ -268,13 +307,27 @@ SensorWatch::Finding SensorWatch::judge(double time, double* outputs, const doub
       for (Hypothesis* each : {slip_.get(), edge_.get(), moved_.get(), blind_.get()})
         if (each->is_active) confront(*each, raw_.data(), false);
     } else if (is_any_measured) {
+      // A sensor passes again of which nothing was said: either slip explains that better, or what was held was wrong.
+      const bool is_slip = slip_->is_active && fits(slip_->filter, raw_.data()) &&
+                           likelihood(slip_->filter, true) > likelihood(filter, true);
+      for (std::size_t s = 0; is_disputed_ && memory_->was_open && !is_slip && s < sensors_.size(); ++s) {
+        const auto was_held = [&](int j) { return held_count_ > 0 && !std::isnan(held_[0].outputs[j]); };
+        if (std::ranges::none_of(sensors_[s].outputs, was_held)) continue;
+        states_[s].reasons |= reason::rejected;
+        quiet_[s] = calm_samples_ = 0;
+      }
       if (is_disputed_) end_dispute();
       for (std::size_t j = 0; j < input_.size() && !is_blind_; ++j)
         if (!std::isnan(input_[j])) believed_input_[j] = input_[j];
     }
     if (!finding.rebase && !finding.release) {
-      memory_->offsets->take(filter, weighed(outputs), std::max(1.0, *std::ranges::max_element(excesses_)));
-      filter.update(weighed(outputs));
+      copy_numbers(filter.mean(), memory_->before_update);
+      filter.update_as_expected(weighed(outputs));
+      double& beyond = memory_->beyond_bounds;
+      beyond += Memory::slip_beyond(filter, memory_->before_update, setup_.noise) - usually_beyond;
+      beyond = std::min(std::max(beyond, 0.0), 2.0 * impossibly_beyond);
+      if (beyond > impossibly_beyond) input_findings_ |= reason::implausible;
+      memory_->offsets->take(filter, std::max(1.0, *std::ranges::max_element(excesses_)));
       if (!is_disputed && memory_->offsets->has_suspect()) {
         memory_->offsets->adopt_suspected(filter);
         end_dispute();
@@ -286,14 +339,17 @@ SensorWatch::Finding SensorWatch::judge(double time, double* outputs, const doub
     is_unobserved_ = false;
     if (finding.rebase) start_search(outputs);
     if (finding.release) std::copy(raw_.begin(), raw_.end(), outputs);
-    filter.expect();
-    for (std::size_t j = 0; j < raw_.size(); ++j) memory_->stuck.corrected(j, filter.expected(static_cast<int>(j)));
+    note_corrected(finding.rebase || finding.release);
     remember(time);
   }
   note_offsets();
   if (is_blind_) input_findings_ |= reason::rejected;
   bool is_calm = input_findings_ == 0;
+  const bool is_open = is_probably_slip();
+  memory_->was_open = is_open;
+  memory_->undisputed_samples = is_disputed_ ? 0 : std::min(memory_->undisputed_samples + 1, setup_.calm);
   for (std::size_t s = 0; s < sensors_.size(); ++s) {
+    if (is_open && findings_[s] == reason::rejected) continue;
     is_calm = is_calm && findings_[s] == 0;
     quiet_[s] = findings_[s] ? 0 : quiet_[s] + 1;
     if (findings_[s]) states_[s].reasons = findings_[s] | (states_[s].reasons & reason::moved);
@@ -392,9 +448,13 @@ SensorWatch::Finding SensorWatch::search_heading(const double* outputs) noexcept
 void SensorWatch::note_offsets() noexcept {
   for (std::size_t s = 0; s < sensors_.size(); ++s) {
     states_[s].offset = 0.0;
-    for (const int j : sensors_[s].outputs)
-      if (const double offset = memory_->offsets->offset(j); std::abs(offset) > std::abs(states_[s].offset))
-        states_[s].offset = offset;
+    states_[s].rival = -1;
+    for (const int j : sensors_[s].outputs) {
+      const double offset = memory_->offsets->offset(j);
+      if (std::abs(offset) <= std::abs(states_[s].offset)) continue;
+      states_[s].offset = offset;
+      states_[s].rival = sensor_of(memory_->offsets->rival(j), sensors_);
+    }
     if (states_[s].offset != 0.0) findings_[s] |= reason::off;
   }
 }
@@ -420,14 +480,27 @@ void SensorWatch::find_stuck(double* outputs) noexcept {
   }
 }
 
+/// What is expected of the outputs, now that they have been used; after a small step, to first order.
+void SensorWatch::note_corrected(bool has_jumped) noexcept {
+  WalkingFilter& filter = own_->filter;
+  const int states = filter.model().state_count();
+  if (has_jumped) filter.expect();
+  for (int j = 0; j < static_cast<int>(raw_.size()); ++j) {
+    double expected = filter.expected(j);
+    for (int i = 0; i < states && !has_jumped; ++i)
+      expected += filter.derivative(j, i) * (filter.mean()[i] - memory_->before_update[i]);
+    memory_->stuck.corrected(static_cast<std::size_t>(j), expected);
+  }
+}
+
 void SensorWatch::remember(double time) noexcept {
   Memory& memory = *memory_;
   memory.newest = static_cast<std::size_t>(memory.count % static_cast<std::int64_t>(memory.entries.size()));
   ++memory.count;
   Memory::Entry& entry = memory.entries[memory.newest];
   entry.time = time;
-  entry.mean = own_->filter.mean();
-  entry.covariance = own_->filter.covariance();
+  copy_numbers(own_->filter.mean(), entry.mean);
+  copy_numbers(own_->filter.covariance(), entry.covariance);
 }
 
 }  // namespace rhec

@@ -1,15 +1,20 @@
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <memory>
+#include <utility>
 #include <vector>
 
-#include <Eigen/Cholesky>
+#include <Eigen/Core>
 
 #include "heading_search.hpp"
+#include "numbers.hpp"
 #include "offset_watch.hpp"
+#include "rhec/core/base/with_size.hpp"
 #include "rhec/core/estimation/sensor_watch.hpp"
 #include "stuck_values.hpp"
 #include "walking_filter.hpp"
@@ -49,23 +54,63 @@ struct SensorWatch::Memory {
   Eigen::VectorXd before_mean;
   Eigen::MatrixXd before_covariance;
   double duration = 0.0;
-  bool has_advanced = false;  ///< since the last samples
-  bool was_calm = true;       ///< health was ok when the dispute began
+  bool has_advanced = false;   ///< since the last samples
+  bool was_calm = true;        ///< health was ok when the dispute began, and there had been none for some time
+  bool was_open = false;       ///< what was disputed at the last sample was probably slip, and nothing was said of it
+  int undisputed_samples = 0;  ///< in a row
+  bool is_slip_possible = false;  ///< slip that explains what is disputed is within its bounds
   StuckValues stuck;
   std::unique_ptr<OffsetWatch> offsets;
   std::unique_ptr<WalkingFilter> trial;   ///< for what is tried within one call
   std::unique_ptr<HeadingSearch> search;  ///< null for a vehicle without a heading
   /// The same, of a heading that may be wrong, while it is not known who is.
   std::unique_ptr<HeadingSearch> second_thought;
-  std::vector<double> first_errors;    ///< n_y: by how much rejected outputs were off when the dispute began
-  int in_vain = 0;                     ///< samples in a row that it has not explained
-  Eigen::LLT<Eigen::MatrixXd> factor;  ///< of a covariance
-  Eigen::VectorXd away;                ///< of slip that has jumped from an estimate
+  std::vector<double> first_errors;  ///< n_y: by how much rejected outputs were off when the dispute began
+  int in_vain = 0;                   ///< samples in a row that it has not explained
+  Eigen::MatrixXd factor;            ///< of a covariance
+  Eigen::VectorXd away;              ///< of slip that has jumped from an estimate
+  Eigen::VectorXd before_update;     ///< the mean
+  Eigen::VectorXd before_slip;       ///< that of slip that may have jumped
+  /// By how much measurements ask for slip beyond its bounds: a cumulative sum of standard deviations (Page 1954).
+  double beyond_bounds = 0.0;
+
+  /// After an update of a filter from a mean: how far slip would be beyond its bounds, in its standard deviations.
+  static double slip_beyond(const WalkingFilter& filter, const Eigen::VectorXd& before,
+                            const KalmanFilter::Noise& noise) noexcept {
+    double most = 0.0;
+    const Eigen::Index nx = filter.model().state_count();
+    for (Eigen::Index p = 0; p < std::ssize(noise.parameter_lower); ++p) {
+      const double lower = noise.parameter_lower[static_cast<std::size_t>(p)],
+                   upper = noise.parameter_upper[static_cast<std::size_t>(p)];
+      const double mean = filter.mean()[nx + p], variance = filter.covariance()(nx + p, nx + p);
+      if ((mean > lower && mean < upper) || !(variance > 0.0)) continue;
+      double slip = before[nx + p];
+      for (int j = 0; j < filter.model().output_count(); ++j)
+        if (const KalmanFilter::Use use = filter.use(j); use.variance > 0.0) slip += use.gain[nx + p] * use.innovation;
+      most = std::max(most, std::max(lower - slip, slip - upper) / std::sqrt(variance));
+    }
+    return most;
+  }
 
   /// log sqrt(det P); NaN where P is not positive definite, as of a parameter that is known.
   double log_volume(const Eigen::MatrixXd& covariance) noexcept {
-    factor.compute(covariance);
-    return factor.info() == Eigen::Success ? factor.matrixLLT().diagonal().array().log().sum() : unknown;
+    copy_numbers(covariance, factor);
+    return with_size(static_cast<int>(factor.rows()), [&](auto n) {
+      double* L = factor.data();
+      double sum = 0.0, product = 1.0;
+      for (int k = 0; k < n; ++k) {
+        const double pivot = L[k * n + k];
+        if (!(pivot > 0.0)) return unknown;
+        product *= pivot;
+        if (product < 1e-200 || product > 1e200) sum += std::log(std::exchange(product, 1.0));
+        const double inverse = 1.0 / pivot;
+        for (int c = k + 1; c < n; ++c) {
+          const double by = L[k * n + c] * inverse;
+          for (int r = c; r < n; ++r) L[c * n + r] -= by * L[k * n + r];
+        }
+      }
+      return 0.5 * (sum + std::log(product));
+    });
   }
 };
 

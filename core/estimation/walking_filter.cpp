@@ -10,7 +10,8 @@
 namespace rhec {
 namespace {
 
-constexpr int most_parts = 32;  // who has a long way to go divides it by itself
+constexpr double rounding = 1e-9;  // of a duration, relative
+constexpr int most_parts = 32;     // who has a long way to go divides it by itself
 
 }  // namespace
 
@@ -21,21 +22,36 @@ double chi_square_limit(int degrees, double sigmas) noexcept {
 }
 
 WalkingFilter::WalkingFilter(std::shared_ptr<const Model> model, const Setup& setup)
-    : setup_(setup), filter_(std::move(model), setup.noise, setup.substeps) {
+    : setup_(setup), filter_(std::move(model), setup.noise, setup.substeps), outputs_(filter_.model().output_count()) {
   const Model& m = filter_.model();
   ramp_variances_.assign(m.parameter_count(), 0.0);
   guess_.assign(m.input_count(), 0.0);
-  expected_.assign(m.output_count(), 0.0);
-  jacobian_.assign(static_cast<std::size_t>(m.output_count()) * m.state_count(), 0.0);
   image_ = Eigen::MatrixXd::Zero(m.state_count(), m.output_count());
 }
 
+std::shared_ptr<const FilterMemo> WalkingFilter::make_memo() {
+  if (setup_.has_ramps) return nullptr;
+  memo_ = std::make_shared<FilterMemo>(
+      FilterMemo::Setup{.noise = setup_.noise, .walk = setup_.walk, .substeps = setup_.substeps}, mean().size());
+  return memo_;
+}
+
+void WalkingFilter::update_as_expected(Measured outputs) noexcept {
+  const bool is_kept = memo_ && !outputs.weights;  // others have the same noise then
+  if (is_kept) memo_->update.begin({outputs.values, static_cast<std::size_t>(outputs_)}, 0.0, filter_);
+  filter_.update_as_expected(outputs);
+  if (is_kept) memo_->update.end(filter_);
+}
+
 void WalkingFilter::predict(const double* inputs, double duration, const double* more_sigmas,
-                            Eigen::MatrixXd* deviations) noexcept {
+                            KalmanFilter::Deviations* deviations) noexcept {
   if (!(duration > 0.0) || !std::isfinite(duration)) return;
   const int parts =
       static_cast<int>(std::min<double>(most_parts, std::max(1.0, std::ceil(duration / setup_.step - 1e-6))));
-  const double part = duration / parts, steps = part / setup_.step;
+  const double part = duration / parts, ratio = part / setup_.step,
+               steps = std::abs(ratio - 1.0) < rounding ? 1.0 : ratio;
+  const bool is_kept = memo_ && parts == 1 && !more_sigmas;
+  if (is_kept) memo_->prediction.begin({inputs, guess_.size()}, duration, filter_);
   for (std::size_t j = 0; j < setup_.walk.size(); ++j) ramp_variances_[j] = setup_.walk[j] * setup_.walk[j] * steps;
   for (std::size_t j = 0; more_sigmas && j < guess_.size(); ++j)
     filter_.set_input_variance(static_cast<int>(j), setup_.noise.input_variances[j] + more_sigmas[j] * more_sigmas[j]);
@@ -47,6 +63,7 @@ void WalkingFilter::predict(const double* inputs, double duration, const double*
       for (std::size_t j = 0; j < setup_.walk.size(); ++j)
         filter_.add_parameter_variance(static_cast<int>(j), ramp_variances_[j]);
     }
+    if (is_kept) memo_->prediction.end(filter_);
     if (deviations) filter_.carry(*deviations);
     if (more_sigmas) limit_states();
   }
@@ -71,23 +88,24 @@ void WalkingFilter::limit_states() noexcept {
 
 void WalkingFilter::expect() noexcept {
   const Model& m = filter_.model();
-  m.observe({.count = 1, .states = mean().data(), .outputs = expected_.data(), .jacobians = jacobian_.data()});
+  filter_.expect();
+  const double* jacobian = filter_.output_jacobian();
   const int nx = m.state_count(), ny = m.output_count();
   for (int j = 0; j < ny; ++j) {
     for (int r = 0; r < nx; ++r) {
       double sum = 0.0;
-      for (int c = 0; c < nx; ++c) sum += covariance()(r, c) * jacobian_[c * ny + j];
+      for (int c = 0; c < nx; ++c) sum += covariance()(r, c) * jacobian[c * ny + j];
       image_(r, j) = sum;
     }
   }
 }
 
-bool WalkingFilter::depends_on(int output, int state) const noexcept {
-  return jacobian_[static_cast<std::size_t>(state) * expected_.size() + output] != 0.0;
-}
+bool WalkingFilter::depends_on(int output, int state) const noexcept { return derivative(output, state) != 0.0; }
 
 bool WalkingFilter::innovation(const Sensor& sensor, Measured outputs, Innovation& result) noexcept {
   const Model& m = filter_.model();
+  const double* jacobian = filter_.output_jacobian();
+  const double* expected = filter_.expected_outputs();
   const int nx = m.state_count(), ny = m.output_count();
   int measured[most_sensor_outputs], count = 0;
   for (const int j : sensor.outputs)
@@ -98,10 +116,10 @@ bool WalkingFilter::innovation(const Sensor& sensor, Measured outputs, Innovatio
   for (int a = 0; a < count; ++a) {
     const int j = measured[a];
     result.value[a] =
-        m.description().outputs[j].is_angle ? angle_difference(outputs[j], expected_[j]) : outputs[j] - expected_[j];
+        m.description().outputs[j].is_angle ? angle_difference(outputs[j], expected[j]) : outputs[j] - expected[j];
     for (int b = 0; b < count; ++b) {
       double sum = a == b ? filter_.noise().output_variances[j] / outputs.weight(j) : 0.0;
-      for (int c = 0; c < nx; ++c) sum += jacobian_[c * ny + j] * image_(c, measured[b]);
+      for (int c = 0; c < nx; ++c) sum += jacobian[c * ny + j] * image_(c, measured[b]);
       result.covariance(a, b) = sum;
     }
   }

@@ -3,6 +3,7 @@
 #include <memory>
 #include <vector>
 
+#include "filter_memo.hpp"
 #include "rhec/core/estimation/health.hpp"
 #include "rhec/core/estimation/kalman_filter.hpp"
 
@@ -20,6 +21,8 @@ class WalkingFilter {
     int substeps = 1;          ///< of a step
   };
   WalkingFilter(std::shared_ptr<const Model> model, const Setup& setup);
+  /// What has been calculated from now on, for others.
+  std::shared_ptr<const FilterMemo> make_memo();
 
   Eigen::VectorXd& mean() noexcept { return filter_.mean; }
   Eigen::MatrixXd& covariance() noexcept { return filter_.covariance; }
@@ -28,12 +31,16 @@ class WalkingFilter {
   const Model& model() const noexcept { return filter_.model(); }
 
   /// Predicts by `duration` [s] in parts of at most a step, with an input (n_u) that holds all the while.
-  /// `more_sigmas` (n_u, or null): of each part's inputs besides their noise. `deviations` (n x m, or null): columns of
-  /// small deviations of [x; p] that are taken along.
+  /// `more_sigmas` (n_u, or null): of each part's inputs besides their noise. `deviations` (or null): small
+  /// ones of [x; p] that are taken along.
   void predict(const double* inputs, double duration, const double* more_sigmas = nullptr,
-               Eigen::MatrixXd* deviations = nullptr) noexcept;
+               KalmanFilter::Deviations* deviations = nullptr) noexcept;
   /// Uses outputs (n_y, NaN where missing).
   void update(Measured outputs) noexcept { filter_.update(outputs); }
+  /// The same after `expect`, if the mean is the same.
+  void update_as_expected(Measured outputs) noexcept;
+  /// How the last update has used an output.
+  KalmanFilter::Use use(int output) const noexcept { return filter_.use(output); }
   /// Makes a parameter anew: its mean stays, with this standard deviation.
   void restart_parameter(int parameter, double sigma) noexcept { filter_.restart_parameter(parameter, sigma * sigma); }
 
@@ -44,10 +51,10 @@ class WalkingFilter {
   bool innovation(const Sensor& sensor, Measured outputs, Innovation& result) noexcept;
   /// Whether an expected output depends on a state.
   bool depends_on(int output, int state) const noexcept;
-  double expected(int output) const noexcept { return expected_[output]; }
+  double expected(int output) const noexcept { return filter_.expected_outputs()[output]; }
   /// Of an expected output by a state.
   double derivative(int output, int state) const noexcept {
-    return jacobian_[static_cast<std::size_t>(state) * expected_.size() + output];
+    return filter_.output_jacobian()[state * outputs_ + output];
   }
 
  private:
@@ -55,7 +62,9 @@ class WalkingFilter {
 
   Setup setup_;
   KalmanFilter filter_;
-  std::vector<double> ramp_variances_, guess_, expected_, jacobian_;
+  int outputs_;  ///< n_y
+  std::shared_ptr<FilterMemo> memo_;
+  std::vector<double> ramp_variances_, guess_;
   Eigen::MatrixXd image_;  ///< P H'
 };
 

@@ -19,6 +19,10 @@ TEST(Health, InWords) {
   health.sensors[1] = {.reasons = reason::off, .accepted = 3, .rejected = 0, .offset = -0.0517};
   EXPECT_EQ(in_words(health, sensors),
             "degraded: x_gps and y_gps rejected and moved; delta off by about -0.052 rad; inputs implausible");
+  health.sensors[1].rival = 0;
+  EXPECT_EQ(in_words(health, sensors),
+            "degraded: x_gps and y_gps rejected and moved; delta off by about -0.052 rad from x_gps and y_gps; inputs "
+            "implausible");
   health.sensors[1] = {};
   health = {.level = HealthLevel::lost, .reasons = reason::uncertain, .sensors = health.sensors, .inputs = {}};
   EXPECT_EQ(in_words(health, sensors), "lost: uncertain; x_gps and y_gps rejected and moved");

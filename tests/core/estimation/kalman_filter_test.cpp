@@ -120,18 +120,20 @@ TEST(KalmanFilter, CarriesDeviationsAsItMovesTheMean) {
   const double inputs[] = {0.3, -0.2}, zeros[] = {0.0, 0.0};
   KalmanFilter filter = filter_for(model);
   const Eigen::Index n = filter.mean.size();
-  Eigen::MatrixXd deviations = 0.1 * Eigen::MatrixXd::Random(n, 3), moved = deviations;
+  KalmanFilter::Deviations moved{.columns = 0.1 * Eigen::MatrixXd::Random(n, 7), .used = 6};
+  const Eigen::MatrixXd before = moved.columns;
   std::vector<Eigen::VectorXd> ends;
-  for (Eigen::Index m = 0; m < moved.cols(); ++m) {
+  for (Eigen::Index m = 0; m < moved.used; ++m) {
     KalmanFilter other = filter_for(model);
-    other.mean += deviations.col(m);
+    other.mean += before.col(m);
     other.predict(inputs, zeros, 0.2);
     ends.push_back(other.mean);
   }
   filter.predict(inputs, zeros, 0.2);
   filter.carry(moved);
-  for (Eigen::Index m = 0; m < moved.cols(); ++m)
-    EXPECT_LT((filter.mean + moved.col(m) - ends[static_cast<std::size_t>(m)]).norm(), 1e-12) << m;
+  EXPECT_EQ(moved.columns.col(moved.used), before.col(moved.used));
+  for (Eigen::Index m = 0; m < moved.used; ++m)
+    EXPECT_LT((filter.mean + moved.columns.col(m) - ends[static_cast<std::size_t>(m)]).norm(), 1e-12) << m;
 }
 
 TEST(KalmanFilter, RestartsAParameterAsIfNothingWereKnownOfIt) {

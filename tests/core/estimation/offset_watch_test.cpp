@@ -31,7 +31,7 @@ struct WatchedBoat {
   KalmanFilter::Noise noise{
       .output_variances = {0.04, 0.01}, .input_variances = {1e-4}, .parameter_lower = {-1e3}, .parameter_upper = {1e3}};
   WalkingFilter filter;
-  OffsetWatch watch{*model, {rate}, noise, gate};
+  OffsetWatch watch{*model, {{.output = rate}}, noise, gate};
 
   explicit WatchedBoat(double walk = 0.01)
       : filter(model, {.noise = noise, .walk = {walk}, .step = 0.1, .substeps = 4}) {
@@ -44,8 +44,8 @@ struct WatchedBoat {
     watch.correct(outputs.data());
     filter.predict(&input, 0.1, nullptr, &watch.sensitivities());
     filter.expect();
-    watch.take(filter, outputs.data(), 1.0);
     filter.update(outputs.data());
+    watch.take(filter, 1.0);
   }
   Estimate estimate() {
     Estimate estimate;
@@ -140,6 +140,32 @@ TEST(OffsetWatch, WithdrawsWhatLaterSamplesDoNotConfirm) {
   EXPECT_EQ(boat.watch.offset(rate), 0.0);
 }
 
+/// What has not been said clearly enough makes the estimate less certain, and moves nothing.
+TEST(OffsetWatch, AnOffsetThatIsProbableMakesTheEstimateWider) {
+  TrueBoat truth;
+  WatchedBoat boat, told;
+  int wider = 0, covered = 0;
+  for (int k = 0; k < 200 && !boat.watch.has_suspect(); ++k) {
+    std::vector<double> outputs = truth.measure(0.0, offset);
+    boat.take(outputs);
+    outputs[rate] -= offset;
+    told.take(outputs);
+    if (!boat.watch.is_in_doubt() || boat.watch.has_suspect()) continue;
+    Estimate estimate = boat.estimate();
+    boat.watch.refine(estimate);
+    EXPECT_EQ(estimate.state, boat.filter.mean().head(3));
+    const double added = estimate.covariance(1, 1) - boat.filter.covariance()(1, 1);
+    EXPECT_GT(added, 0.0);
+    const double away = boat.filter.mean()[1] - told.filter.mean()[1];
+    EXPECT_LT(added, away * away + 0.01) << "no more than the offset has done, and what is not known of it";
+    covered += added > 0.5 * away * away;
+    ++wider;
+  }
+  EXPECT_TRUE(boat.watch.has_suspect());
+  EXPECT_GE(wider, 3);
+  EXPECT_GE(covered, 1);
+}
+
 /// An offset of which half was adopted: what is given out is nearer to the truth than the filter, and says how far it
 /// may be off.
 TEST(OffsetWatch, GivesOutWhatIsLeftOfAnOffset) {
@@ -226,6 +252,48 @@ TEST_P(OffsetFaults, AnAngleThatIsRightAgainIsBelieved) {
     SCOPED_TRACE(seed);
     const Episode episode = drive_with_fault(vehicle, fault, static_cast<std::uint64_t>(seed), 200);
     EXPECT_LE(episode.samples_to_ok(), 120);
+  }
+}
+
+/// Of two receivers one is off by five of its standard deviations. Which one is not known: both are named, and what is
+/// given out has room for both places.
+TEST_P(OffsetFaults, TwoReceiversThatDifferForLongAreBothNamed) {
+  for (const char* noise : {"0.3", "0.03"}) {
+    SCOPED_TRACE(noise);
+    const Robot two = with_two_receivers(GetParam(), noise);
+    for (int seed = 1; seed <= seeds; ++seed) {
+      SCOPED_TRACE(seed);
+      const double size = 5.0 * std::stod(noise);
+      const Fault fault{.spoil = [=](Delivery& d) { d.outputs[3] += size; }, .length = 100};
+      const Episode episode = drive_with_fault(two, fault, static_cast<std::uint64_t>(seed), 0);
+      EXPECT_TRUE(episode.is_finite);
+      EXPECT_GE(episode.honest_share(), 0.95);
+      std::ptrdiff_t said = 0;
+      for (std::size_t k = 20; k < episode.during.size(); ++k) {
+        const Episode::Sample& sample = episode.during[k];
+        if (sample.words.find(" off by about ") == std::string::npos) continue;
+        ++said;
+        EXPECT_THAT(sample.words, HasSubstr("degraded: x_rough and y_rough "));
+        EXPECT_THAT(sample.words, HasSubstr(" m from x_gps and y_gps"));
+        EXPECT_EQ(sample.health, HealthLevel::degraded);
+        EXPECT_TRUE(sample.inside);
+        EXPECT_LT(sample.error, std::max(usual_error, 1.2 * size));
+      }
+      EXPECT_GE(said, 40) << "in some rides most of its samples fail their gate, and are rejected for some time";
+    }
+  }
+}
+
+TEST_P(OffsetFaults, TwoReceiversThatAgreeAreBelieved) {
+  const Fault none{.spoil = [](Delivery&) {}, .length = 200};
+  for (const char* noise : {"0.3", "0.03"}) {
+    SCOPED_TRACE(noise);
+    const Robot two = with_two_receivers(GetParam(), noise);
+    for (int seed = 31; seed <= 50; ++seed) {
+      SCOPED_TRACE(seed);
+      const Episode episode = drive_with_fault(two, none, static_cast<std::uint64_t>(seed), 0);
+      for (const Episode::Sample& sample : episode.during) ASSERT_THAT(sample.words, Not(HasSubstr("off")));
+    }
   }
 }
 

@@ -46,8 +46,7 @@ TEST_P(SensorVerdicts, AnEstimateInDoubtCoversSlipThatHasJumped) {
   int doubted = 0;
   expect_each({.spoil = {}, .length = 20, .moved = 0.0, .slip = 0.35}, [&](const Episode& episode) {
     for (const Episode::Sample& sample : episode.during) {
-      if (sample.health == HealthLevel::ok) continue;
-      ++doubted;
+      doubted += sample.error > 0.5 * usual_error;
       EXPECT_TRUE(sample.inside) << "off by " << sample.error << " m: " << sample.words;
     }
   });
@@ -105,7 +104,7 @@ TEST(SensorVerdict, AnEstimateInDoubtHasTheSecondMomentOfBothAnswers) {
   };
   {
     const Estimate &given = doubt.judging->estimate(doubt.time), &alone = doubt.without->estimate(doubt.time);
-    EXPECT_EQ(given.health.level, HealthLevel::degraded);
+    EXPECT_EQ(given.health.level, HealthLevel::ok) << "it agrees with what the sensors say";
     EXPECT_FALSE(given.predicted);
     EXPECT_EQ(given.time, alone.time);
     EXPECT_EQ(given.state, alone.state) << "a single position does not move the mean";

@@ -45,6 +45,36 @@ TEST(WalkingFilter, LongPredictionsAreMadeOfSteps) {
   EXPECT_LT((once.covariance() - often.covariance()).norm(), 1e-12);
 }
 
+/// To the bit, and only where it is asked for the same.
+TEST(WalkingFilter, WhatItHasCalculatedIsThereForOthers) {
+  WalkingFilter filter = make();
+  const std::shared_ptr<const FilterMemo> memo = filter.make_memo();
+  KalmanFilter other(linear_model<Boat>(), memo->setup().noise, memo->setup().substeps);
+  other.mean = filter.mean();
+  other.covariance = filter.covariance();
+  KalmanFilter start = other;
+  const double input = 0.7, outputs[] = {0.2, nan};
+  filter.predict(&input, 0.1);
+  const double another = 0.8;
+  EXPECT_FALSE(memo->prediction.take({&another, 1}, 0.1, other));
+  EXPECT_FALSE(memo->prediction.take({&input, 1}, 0.11, other));
+  EXPECT_FALSE(memo->update.take(outputs, 0.0, other)) << "no update yet";
+  EXPECT_EQ(other.mean, start.mean);
+  ASSERT_TRUE(memo->prediction.take({&input, 1}, 0.1, other));
+  EXPECT_EQ(other.mean, filter.mean());
+  EXPECT_EQ(other.covariance, filter.covariance());
+  EXPECT_FALSE(memo->prediction.take({&input, 1}, 0.1, other)) << "from here, it is another step";
+  filter.expect();
+  filter.update_as_expected(outputs);
+  start.predict(&input, &input, 0.1);
+  start.add_parameter_variance(0, 0.05 * 0.05);
+  start.update(outputs, nullptr);
+  ASSERT_TRUE(memo->update.take(outputs, 0.0, other));
+  EXPECT_EQ(other.mean, filter.mean());
+  EXPECT_EQ(other.mean, start.mean);
+  EXPECT_EQ(other.covariance, start.covariance);
+}
+
 TEST(WalkingFilter, WhatIsNotKnownOfInputsCountsOnce) {
   WalkingFilter filter = make(), other = make();
   const double input = 0.7, more = 2.0;

@@ -11,6 +11,8 @@
 
 namespace rhec {
 
+class FilterMemo;
+
 /// The estimation algorithm behind an Estimator: it gets nodes one after the other, with intervals between them.
 class RHEC_EXPORT EstimationMethod {
  public:
@@ -45,6 +47,8 @@ class RHEC_EXPORT EstimationMethod {
   /// Goes on at the newest node from moments of [x; p] (n, n x n) that contain all that is known of it: what was
   /// measured before counts no longer. There was a first node. False if the method cannot, and nothing has changed.
   virtual bool rebase(const Eigen::VectorXd& /*mean*/, const Eigen::MatrixXd& /*covariance*/) noexcept { return false; }
+  /// What the judge of measurements has calculated before a node is added, for a method that would do the same.
+  virtual void listen(std::shared_ptr<const FilterMemo> /*memo*/) {}
   /// The drive has ended: completes what the method keeps beyond it, such as a map.
   virtual void end_drive() noexcept {}
   /// What slip to expect ahead, of a method that remembers places; else null.

@@ -40,6 +40,7 @@ class RHEC_EXPORT FilterEstimation final : public EstimationMethod {
   void estimate(Estimate& result, Clock::time_point deadline) noexcept override;
   void reset() noexcept override;
   bool rebase(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance) noexcept override;
+  void listen(std::shared_ptr<const FilterMemo> memo) override;
   /// More than one heading is left.
   bool is_searching() const noexcept { return alive_ > 1; }
 
@@ -64,6 +65,7 @@ class RHEC_EXPORT FilterEstimation final : public EstimationMethod {
   double log_likelihood(const KalmanFilter& filter, Measured outputs) noexcept;
 
   Setup setup_;
+  std::shared_ptr<const FilterMemo> memo_;  ///< null: none that would be of use
   std::vector<Hypothesis> bank_;
   bool is_rebased_ = false;  ///< what was known before the first node that is remembered is not
   std::size_t alive_ = 1, best_ = 0;

@@ -38,6 +38,8 @@ struct SensorHealth {
   std::int64_t rejected = 0;  ///< likewise
   /// What is taken out of its values, in their unit; of several outputs the largest. 0: nothing.
   double offset = 0.0;
+  /// The sensor from which it differs by that much, where it is not known which of the two is off; -1: none.
+  int rival = -1;
 };
 
 /// Of an estimate.

@@ -28,6 +28,7 @@ class RHEC_EXPORT KalmanFilter {
     std::vector<int> motion_outputs = {};
     /// Outputs of which each measurement counts by itself, also if there are many (ReadingSummary).
     std::vector<int> single_outputs = {};
+    bool operator==(const Noise&) const = default;
   };
   /// `most_between`: measurements that there can be between two nodes.
   KalmanFilter(std::shared_ptr<const Model> model, Noise noise, int substeps, int most_between = 0);
@@ -38,6 +39,12 @@ class RHEC_EXPORT KalmanFilter {
   /// Measurement update with y (n_y, NaN where missing). `information_weights` (n_y, or null) take the place of those
   /// that y was measured with.
   void update(Measured y, const double* information_weights = nullptr) noexcept;
+  /// Outputs at the mean, and their derivatives by the state (n_y x n_x, by columns).
+  void expect() noexcept;
+  const double* expected_outputs() const noexcept { return predicted_.data(); }
+  const double* output_jacobian() const noexcept { return output_jacobian_.data(); }
+  /// `update` after `expect`, if the mean is the same.
+  void update_as_expected(Measured y) noexcept;
   /// Time update by `duration` [s] with a measured input (n_u). Where it is missing (NaN), the guess replaces it, with
   /// the standard deviation `unknown_sigma`.
   void predict(const double* measured_input, const double* input_guess, double duration) noexcept;
@@ -78,8 +85,23 @@ class RHEC_EXPORT KalmanFilter {
   /// Restarts a parameter: it keeps its mean and gets this variance, without correlation to anything else.
   void restart_parameter(int parameter, double variance) noexcept;
 
-  /// Moves small deviations of [x; p] (columns, n x m) on as the last prediction by a duration has moved the mean.
-  void carry(Eigen::MatrixXd& deviations) noexcept;
+  /// Small deviations of [x; p], one a column, of which only the first `used` matter.
+  struct Deviations {
+    using Columns = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+    Columns columns;
+    Eigen::Index used = 0;
+  };
+  /// Moves them on as the last prediction by a duration has moved the mean.
+  void carry(Deviations& deviations) noexcept;
+
+  /// How the last update has used an output, after those before it.
+  struct Use {
+    double innovation = 0.0, variance = 0.0;  ///< of the innovation; 0: it was not used
+    const double* gain = nullptr;             ///< n_x + n_p
+  };
+  Use use(int output) const noexcept {
+    return {innovations_[output], innovation_variances_[output], gains_.col(output).data()};
+  }
 
   /// The noise of a measured input, or of an output, from now on.
   void set_input_variance(int input, double variance) noexcept { noise_.input_variances[input] = variance; }
@@ -113,14 +135,17 @@ class RHEC_EXPORT KalmanFilter {
   std::shared_ptr<const Model> model_;
   Noise noise_;
   int substeps_, nx_, nu_, np_, ny_;
-  std::vector<int> curved_outputs_;  ///< of motion
-  Curvature output_curvature_;       ///< of these, by the state
-  std::vector<double> added_;        ///< n_y: variances of second-order terms
-  Eigen::MatrixXd before_;           ///< an update: the covariance
+  std::vector<int> curved_outputs_;                         ///< of motion
+  Curvature output_curvature_;                              ///< of these, by the state
+  std::vector<double> added_;                               ///< n_y: variances of second-order terms
+  std::vector<double> innovations_, innovation_variances_;  ///< n_y, of the last update
+  Eigen::MatrixXd gains_;                                   ///< (n_x + n_p) x n_y, likewise
+  Eigen::MatrixXd before_;                                  ///< an update: the covariance
   std::vector<double> predicted_, output_jacobian_, next_, jacobian_, input_;
   AlignedDoubles row_, next_row_, jacobian_rows_, scratch_;  ///< for Model::integrate_rows
   Eigen::MatrixXd work_, next_covariance_;
   Eigen::VectorXd gain_, image_, zeros_, correction_;
+  std::vector<double> carried_;  ///< states of some deviations
   /// Within an interval: [x; p; u; change of p; f], the gradient of an output, and the transition to [x; p] at its end.
   /// f are the factors of the second-order terms (Curvature) of `curved_` states at the first measurement, then of
   /// those at the end.

@@ -11,6 +11,7 @@
 
 namespace rhec {
 
+class FilterMemo;
 class HeadingSearch;
 class WalkingFilter;
 
@@ -60,6 +61,7 @@ class RHEC_EXPORT SensorWatch {
 
   const std::vector<Sensor>& sensors() const noexcept { return sensors_; }
   const Setup& setup() const noexcept { return setup_; }
+  std::shared_ptr<const FilterMemo> make_memo();  ///< see EstimationMethod::listen
   void reset() noexcept;
 
   /// Marks measured inputs that cannot be as missing (NaN).
@@ -154,17 +156,16 @@ class RHEC_EXPORT SensorWatch {
   double consider_slip() noexcept;
   void consider_moved(double likelihood_of_new_slip) noexcept;
   void begin_edge(bool is_new) noexcept;
-  bool goes_on() noexcept;
+  bool goes_on() noexcept, may_follow() const noexcept;
   void hold_back(double time, const double* outputs) noexcept;
-  void acquit(const double* outputs) noexcept;
-  void end_dispute() noexcept;
+  void acquit(const double*outputs) noexcept, end_dispute() noexcept;
   bool sees_position(int output) const noexcept;
   bool sees_position(const std::vector<int>& outputs) const noexcept;
   bool is_position_disputed() const noexcept, is_place_lost() const noexcept, is_placed_otherwise() const noexcept;
-  bool may_follow() const noexcept;
-  bool is_within_bounds(const WalkingFilter& filter) const noexcept;
+  bool is_within_bounds(const WalkingFilter&filter) const noexcept, is_probably_slip() const noexcept;
   void test_inputs(const double* outputs) noexcept;
   void note_offsets() noexcept;
+  void note_corrected(bool has_jumped) noexcept;
   void remember(double time) noexcept;
   void note_volume(const Estimate& estimate) noexcept;
   double limit(std::size_t sensor, Eigen::Index degrees) const noexcept;
