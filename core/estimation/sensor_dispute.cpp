@@ -313,7 +313,8 @@ bool SensorWatch::is_within_bounds(const WalkingFilter& filter) const noexcept {
 /// has the covariance of both answers, so that it agrees with what the sensors say: nothing is wrong with it.
 bool SensorWatch::is_probably_slip() const noexcept {
   return is_disputed_ && disputed_samples_ <= fresh && slip_->is_active && slip_probability_ > probable &&
-         memory_->was_calm && memory_->is_slip_possible && is_within_bounds(own_->filter);
+         memory_->was_calm && memory_->is_slip_possible && is_within_bounds(own_->filter) &&
+         (input_findings_ | inputs_.reasons) == 0;
 }
 
 /// What was held back, and what was rejected last, is right after all.
