@@ -87,15 +87,12 @@ Estimator::Estimator(std::unique_ptr<EstimationMethod> method, const Timeline& t
       static_cast<int>(sensors) + 1,
       Clocks::Setup{.usual_interval = timeline.longest_interval,
                     .behind = std::max(least_lateness, method_->most_reach() * timeline.longest_interval)});
-  const int outputs = model().output_count();
-  waiting_ = std::make_unique<StampedRows>(timeline.capacity, 2 * outputs);
-  merged_weights_.assign(outputs, 1.0);
-  row_.assign(2 * static_cast<std::size_t>(outputs), 1.0);
-  for (std::size_t j = sigmas_.size(); j < merged_weights_.size(); ++j)
+  waiting_ = std::make_unique<MeasuredRows>(timeline.capacity, model().output_count());
+  merged_ = MeasuredOutputs(model().output_count());
+  for (std::size_t j = sigmas_.size(); j < merged_.size(); ++j)
     sigmas_.push_back(std::sqrt(watch_->setup().noise.output_variances[j]));
   presence_.assign(sensors, SensorWatch::Presence::present);
   input_sigmas_.assign(input_.size(), 0.0);
-  merged_.assign(model().output_count(), missing_value);
   for (Estimate* e : {&estimate_, &predicted_}) assess(*e, 0.0);
 }
 
@@ -207,17 +204,12 @@ void Estimator::push(double time, Measured outputs) noexcept {
   if (!watch_) return push_judged(time, outputs);
   if (!has_started() || time > watched_ + timeline_.tolerance) {
     counts_.dropped += waiting_->is_full();
-    for (std::size_t j = 0; j < merged_.size(); ++j) {
-      const auto output = static_cast<std::ptrdiff_t>(j);
-      row_[j] = outputs[output];
-      row_[merged_.size() + j] = outputs.weight(output);
-    }
-    waiting_->insert(time, row_.data());
+    waiting_->insert(time, outputs);
     return;
   }
-  std::copy_n(outputs.values, merged_.size(), merged_.begin());
-  watch_->judge_late(time, merged_.data(), outputs.weights);
-  push_judged(time, {merged_.data(), outputs.weights});
+  merged_.assign(outputs);
+  watch_->judge_late(time, merged_.values(), merged_.measured().weights);
+  push_judged(time, merged_.measured());
 }
 
 void Estimator::push_judged(double time, Measured outputs) noexcept {
@@ -277,21 +269,13 @@ bool Estimator::judge_waiting(double until, Clock::time_point deadline) noexcept
   for (int judged = 0; waiting_->size() > 0 && waiting_->time(0) <= until + timeline_.tolerance; ++judged) {
     if (judged > 0 && is_past(deadline)) return false;
     const double time = waiting_->time(0);
-    std::fill(merged_.begin(), merged_.end(), missing_value);
-    bool is_usual = true;
+    merged_.clear();
     std::size_t same = 0;  // rows with this stamp, e.g. of two sensors
     for (; same < waiting_->size() && waiting_->time(same) <= time + timeline_.tolerance; ++same)
-      for (std::size_t j = 0; j < merged_.size(); ++j) {
-        const double* const row = waiting_->values(same);
-        if (std::isnan(row[j])) continue;
-        merged_[j] = row[j];
-        merged_weights_[j] = row[merged_.size() + j];
-        is_usual = is_usual && merged_weights_[j] == 1.0;
-      }
+      merged_.add(waiting_->measured(same));
     waiting_->drop_front(same);
-    const double* const weights = is_usual ? nullptr : merged_weights_.data();
-    const SensorWatch::Finding finding = judge(time, merged_.data(), weights, deadline);
-    push_judged(time, {merged_.data(), weights});
+    const SensorWatch::Finding finding = judge(time, merged_, deadline);
+    push_judged(time, merged_.measured());
     for (int i = 0; finding.release && i < watch_->held_count(); ++i)
       push_judged(watch_->held()[i].time, watch_->held()[i].outputs.measured());
     bool is_complete = true;
@@ -319,8 +303,7 @@ void Estimator::rebase(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covar
 }
 
 /// Judges a row before it is used; what fails becomes NaN.
-SensorWatch::Finding Estimator::judge(double time, double* outputs, const double* weights,
-                                      Clock::time_point deadline) noexcept {
+SensorWatch::Finding Estimator::judge(double time, MeasuredOutputs& outputs, Clock::time_point deadline) noexcept {
   const double last = watched_;
   watched_ = time;
   if (!has_started()) return {};
@@ -333,7 +316,7 @@ SensorWatch::Finding Estimator::judge(double time, double* outputs, const double
       watch_->advance(end - begin, grid_.mean_input(begin, end));
     }
   });
-  const SensorWatch::Finding finding = watch_->judge(time, outputs, weights);
+  const SensorWatch::Finding finding = watch_->judge(time, outputs.values(), outputs.measured().weights);
   counts_.rejected = 0;
   for (const SensorHealth& sensor : watch_->sensor_states()) counts_.rejected += sensor.rejected;
   return finding;

@@ -18,12 +18,11 @@ constexpr double near_share = 0.05;  // of a step: so far nodes are moved to mea
 NodeGrid::NodeGrid(const Setup& setup)
     : setup_(setup),
       near_(std::max(near_share * setup.step, setup.tolerance)),
-      measurements_(setup.capacity, 2 * setup.outputs),
+      measurements_(setup.capacity, setup.outputs),
       inputs_(setup.capacity, setup.inputs),
       nodes_(static_cast<std::size_t>(setup.reach) + 2),
       between_(setup.outputs, setup.most_between),
       outputs_(setup.outputs),
-      row_(2 * static_cast<std::size_t>(setup.outputs), 1.0),
       mean_(setup.inputs, 0.0),
       weight_(setup.inputs, 0.0) {
   clear();
@@ -66,11 +65,7 @@ NodeGrid::Place NodeGrid::push_measurement(double time, Measured outputs, int re
   }
   const bool was_full = measurements_.is_full();
   const double oldest_row = was_full ? measurements_.time(0) : 0.0;
-  for (int j = 0; j < setup_.outputs; ++j) {
-    row_[j] = outputs[j];
-    row_[setup_.outputs + j] = outputs.weight(j);
-  }
-  const bool is_taken = measurements_.insert(time, row_.data()) < measurements_.size();
+  const bool is_taken = measurements_.insert(time, outputs) < measurements_.size();
   if (was_full) {
     // What a node has used is not lost, but cannot be used anew.
     const bool is_used = count_ > 0 && oldest_row <= this->time() + setup_.tolerance;
@@ -175,9 +170,9 @@ void NodeGrid::collect(const Node& next, std::size_t from, std::size_t end) noex
     const std::size_t behind = std::min(group_end(row), end);
     if (measurements_.time(row) < next.time - setup_.tolerance) {
       if (between_.add(measurements_.time(row) - start))
-        for (; row < behind; ++row) between_.add_outputs(between_.count() - 1, measured(row));
+        for (; row < behind; ++row) between_.add_outputs(between_.count() - 1, measurements_.measured(row));
     } else {
-      for (; row < behind; ++row) outputs_.add(measured(row));
+      for (; row < behind; ++row) outputs_.add(measurements_.measured(row));
     }
     row = behind;
   }

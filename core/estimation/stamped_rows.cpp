@@ -43,4 +43,12 @@ void StampedRows::drop_front(std::size_t rows) noexcept {
   if (count_ == 0) first_ = 0;
 }
 
+std::size_t MeasuredRows::insert(double time, Measured measured) noexcept {
+  for (int j = 0; j < outputs_; ++j) {
+    row_[j] = measured[j];
+    row_[outputs_ + j] = measured.weight(j);
+  }
+  return StampedRows::insert(time, row_.data());
+}
+
 }  // namespace rhec

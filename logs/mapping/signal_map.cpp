@@ -97,11 +97,16 @@ void check_topics(const MappedSignal& signal) {
 }
 
 /// `sigma` or `variance`: what records say of their own accuracy.
-void set_accuracy(MappedSignal& signal) {
+void set_accuracy(MappedSignal& signal, const Settings& keys) {
   const SignalOptions& options = signal.options;
   const bool is_variance = !options.variance.is_null();
   const Settings& key = is_variance ? options.variance : options.sigma;
-  if (key.is_null()) return;
+  if (key.is_null()) {
+    for (const char* lone : {"sigma_scale", "least_sigma"})
+      if (const Settings* found = keys.find(lone))
+        throw found->error("is for what `sigma` or `variance` states; expected one of these beside it");
+    return;
+  }
   if (is_variance && !options.sigma.is_null()) throw key.error("found beside `sigma`; expected one of them");
   if (!signal.is_output) throw key.error("is for outputs; the noise of an input is that of the scenario");
   if (key.kind() != Settings::Kind::scalar)
@@ -291,7 +296,7 @@ void SignalMap::add(const Settings& map, const std::vector<Variable>& variables,
         check_count(signal, *entry);
       }
       if (!signal.options.when.is_null()) signal.conditions = conditions_in(signal.options.when);
-      set_accuracy(signal);
+      set_accuracy(signal, keys);
       check_topics(signal);
       set_factor(signal, *entry);
       signal.sigma_factor = signal.options.sigma_scale * std::abs(signal.factor);

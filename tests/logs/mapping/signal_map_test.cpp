@@ -75,7 +75,9 @@ TEST(SignalMap, MistakesNameTheirPlaceAndARemedy) {
               HasSubstr("'/fix:position_covariance[0]'"));
   EXPECT_THAT(message_of("outputs:\n  x_gps: {from: /a:x, variance: '/b:y'}"),
               AllOf(HasSubstr("robot.yaml:2"), HasSubstr("variance"), HasSubstr("'/b:y' is in other records")));
-  EXPECT_THAT(message_of("outputs: {x_gps: {from: a, sigma_scale: 0}}"), HasSubstr("sigma_scale"));
+  EXPECT_THAT(message_of("outputs: {x_gps: {from: a, sigma: b, sigma_scale: 0}}"), HasSubstr("sigma_scale"));
+  EXPECT_THAT(message_of("outputs: {x_gps: {from: a, least_sigma: 1}}"),
+              AllOf(HasSubstr("least_sigma"), HasSubstr("`sigma` or `variance`")));
   EXPECT_THAT(message_of("origin: [1]"), HasSubstr("latitude, longitude and height"));
   EXPECT_THAT(message_of("origin: [100, 0, 0]"), HasSubstr("within 90 degrees"));
   EXPECT_THAT(message_of("inputs: {delta_rate: {from: [a, b], as: turn, unit: m/s}}"), HasSubstr("`track`"));

@@ -107,7 +107,7 @@ class RHEC_EXPORT Estimator {
   double place_on_timeline(double stamp, int source) noexcept;
   double place_on_timeline(double stamp, const double* outputs) noexcept;
   bool judge_waiting(double until, Clock::time_point deadline) noexcept;
-  SensorWatch::Finding judge(double time, double* outputs, const double* weights, Clock::time_point deadline) noexcept;
+  SensorWatch::Finding judge(double time, MeasuredOutputs& outputs, Clock::time_point deadline) noexcept;
   int inputs_source() const noexcept { return static_cast<int>(presence_.size()); }
   double longest_silence(int source) const noexcept;
   template <class Function>
@@ -135,10 +135,11 @@ class RHEC_EXPORT Estimator {
   std::vector<double> input_, next_, values_, delayed_, sigmas_, weights_;
   // With a judge:
   std::unique_ptr<SensorWatch> watch_;
-  std::unique_ptr<Clocks> clocks_;        ///< of the sensors, and last of the inputs
-  std::unique_ptr<StampedRows> waiting_;  ///< measurements that are not judged yet: outputs, then their weights
-  double watched_ = 0.0;                  ///< time of the last sample that was judged
-  std::vector<double> merged_, merged_weights_, row_, input_sigmas_;
+  std::unique_ptr<Clocks> clocks_;         ///< of the sensors, and last of the inputs
+  std::unique_ptr<MeasuredRows> waiting_;  ///< measurements that are not judged yet
+  double watched_ = 0.0;                   ///< time of the last sample that was judged
+  MeasuredOutputs merged_;
+  std::vector<double> input_sigmas_;
   std::vector<SensorWatch::Presence> presence_;
 };
 

@@ -88,14 +88,12 @@ class RHEC_EXPORT NodeGrid {
   std::size_t group_end(std::size_t row) const noexcept;
   Node next_node(const Node& last, std::size_t from, std::size_t end) const noexcept;
   void collect(const Node& next, std::size_t from, std::size_t end) noexcept;
-  Measured measured(std::size_t row) const noexcept {
-    return {measurements_.values(row), measurements_.values(row) + setup_.outputs};
-  }
 
   Setup setup_;
-  double near_;                        ///< how far a node is moved at most [s]
-  StampedRows measurements_, inputs_;  ///< of measurements: outputs, then their weights
-  std::vector<Node> nodes_;            ///< the newest ones, in a ring
+  double near_;  ///< how far a node is moved at most [s]
+  MeasuredRows measurements_;
+  StampedRows inputs_;
+  std::vector<Node> nodes_;  ///< the newest ones, in a ring
   std::int64_t count_ = 0;
   double start_ = 0.0;
   double changed_, changed_input_;  ///< stamps of the oldest rows that came behind nodes
@@ -104,7 +102,7 @@ class RHEC_EXPORT NodeGrid {
   double duration_ = 0.0;
   BetweenNodes between_;
   MeasuredOutputs outputs_;
-  std::vector<double> row_, mean_, weight_;
+  std::vector<double> mean_, weight_;
 };
 
 }  // namespace rhec

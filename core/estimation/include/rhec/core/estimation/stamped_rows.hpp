@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "rhec/core/base/export.hpp"
+#include "rhec/core/horizon/measured_interval.hpp"
 
 namespace rhec {
 
@@ -28,6 +29,20 @@ class RHEC_EXPORT StampedRows {
  private:
   std::size_t capacity_, width_, first_ = 0, count_ = 0;
   std::vector<double> times_, values_;
+};
+
+/// The same of measurements, with their weights.
+class RHEC_EXPORT MeasuredRows final : public StampedRows {
+ public:
+  MeasuredRows(std::size_t capacity, int outputs)
+      : StampedRows(capacity, 2 * outputs), outputs_(outputs), row_(2 * static_cast<std::size_t>(outputs)) {}
+
+  std::size_t insert(double time, Measured measured) noexcept;
+  Measured measured(std::size_t i) const noexcept { return {values(i), values(i) + outputs_}; }
+
+ private:
+  int outputs_;
+  std::vector<double> row_;  ///< outputs, then their weights
 };
 
 }  // namespace rhec

@@ -57,6 +57,7 @@ class RHEC_EXPORT MeasuredOutputs {
   void remove(const double* y) noexcept;
   /// Until the next change.
   Measured measured() const noexcept { return {values_.data(), has_weights_ ? weights_.data() : nullptr}; }
+  double* values() noexcept { return values_.data(); }
   double operator[](std::ptrdiff_t output) const noexcept { return values_[output]; }
   std::size_t size() const noexcept { return values_.size(); }
 
