@@ -34,6 +34,13 @@ VehicleGraph formula_copy(const VehicleGraph& vehicle, std::span<const int> chos
   const auto outputs = copies.begin() + static_cast<std::ptrdiff_t>(vehicle.rates.size());
   made.rates.assign(copies.begin(), outputs);
   made.outputs.assign(outputs, copies.end());
+  if (const auto& straight = vehicle.straight) {
+    StraightMotion& motion = made.straight.emplace();
+    motion.ground_speed = copy_input(straight->ground_speed);
+    const auto copied = [&](int node) { return copy_nodes(from, {&node, 1}, to, known, known_there).front(); };
+    for (const int node : straight->states) motion.states.push_back(node < 0 ? -1 : copied(node));
+    for (const int node : straight->inputs) motion.inputs.push_back(copied(node));
+  }
   return made;
 }
 

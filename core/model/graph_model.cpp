@@ -36,27 +36,25 @@ void for_each_block(const Tape& tape, int rows, Evaluate evaluate) {
 
 }  // namespace
 
-GraphModel::GraphModel(const VehicleGraph& vehicle, ModelDescription description, const StraightMotion* straight,
-                       const StraightCode* code)
+GraphModel::GraphModel(const VehicleGraph& vehicle, ModelDescription description, const StraightCode* code)
     : vehicle_(formula_copy(vehicle)),
       description_(std::move(description)),
       n_{static_cast<int>(vehicle.states.size()), static_cast<int>(vehicle.inputs.size()),
          static_cast<int>(vehicle.parameters.size()), static_cast<int>(vehicle.outputs.size())},
       code_(code && code->fingerprint == fingerprint_of(vehicle_) ? code : nullptr) {
   check_description(description_, {.states = n_.x, .inputs = n_.u, .parameters = n_.p, .outputs = n_.y});
-  const Graph& graph = *vehicle.graph;
   const auto tape = [&](const std::vector<int>& inputs, const std::vector<int>& results) {
-    return Tape(graph, inputs, results, vehicle.options);
+    return Tape(*vehicle_.graph, inputs, results, vehicle_.options);
   };
-  rates_ = tape(joined(vehicle.states, vehicle.parameters, vehicle.inputs), vehicle.rates);
-  if (straight) {
+  rates_ = tape(joined(vehicle_.states, vehicle_.parameters, vehicle_.inputs), vehicle_.rates);
+  if (const auto& straight = vehicle_.straight) {
     std::vector<int> results = straight->inputs;
     for (int j = 0; j < n_.x; ++j) {
       if (straight->states[j] < 0) continue;
       straight_states_.push_back(j);
       results.push_back(straight->states[j]);
     }
-    straight_ = tape(joined(std::vector<int>{straight->ground_speed}, vehicle.parameters), results);
+    straight_ = tape(joined(std::vector<int>{straight->ground_speed}, vehicle_.parameters), results);
   }
   GraphModel::use_instruction_set(GraphModel::instruction_sets().back());
 }

@@ -1,13 +1,13 @@
 #include "rhec/core/model/model_functions.hpp"
 
 #include <algorithm>
-#include <bit>
 #include <cstddef>
-#include <map>
+#include <unordered_map>
 #include <utility>
 
 #include <fmt/format.h>
 
+#include "rhec/core/formula/graph_copy.hpp"
 #include "rhec/core/formula/straight_code.hpp"
 #include "rhec/core/model/formula_copy.hpp"
 #include "rhec/core/model/motion_outputs.hpp"
@@ -35,19 +35,6 @@ std::vector<int> option_nodes(const VehicleGraph& vehicle) {
   for (const auto& [node, value] : vehicle.options) nodes.push_back(node);
   return nodes;
 }
-
-/// 64-bit FNV-1a (Fowler, Noll and Vo).
-class Hash {
- public:
-  void add(std::uint64_t word) {
-    for (int byte = 0; byte < 8; ++byte, word >>= 8) value_ = (value_ ^ (word & 0xff)) * 0x100000001b3u;
-  }
-  void add(int number) { add(static_cast<std::uint64_t>(static_cast<std::uint32_t>(number))); }
-  std::uint64_t value() const { return value_; }
-
- private:
-  std::uint64_t value_ = 0xcbf29ce484222325u;
-};
 
 /// Whether a step that takes so many operations by its stages need not be made to see that it is too long as a whole:
 /// that takes no less than half of them.
@@ -184,40 +171,15 @@ std::vector<int> ModelFunctions::results(ModelFunction function) {
 }
 
 std::uint64_t fingerprint_of(const VehicleGraph& vehicle) {
-  const Graph& graph = *vehicle.graph;
   Hash all;
-  // What a node means. Its number does not count: compilers evaluate the operands of a formula in one order or the
-  // other, so that kernels written on one machine may be of another order than the formula on their target.
-  std::map<int, std::uint64_t> meanings;
-  // Independent variables mean their place among those of a model.
-  const auto add_variable = [&](int node) {
-    Hash hash;
-    hash.add(static_cast<int>(Operation::input));
-    hash.add(static_cast<int>(meanings.size()));
-    meanings.emplace(node, hash.value());
-  };
+  std::vector<int> variables = option_nodes(vehicle);
+  all.add(static_cast<int>(variables.size()));
   for (const auto* list : {&vehicle.states, &vehicle.parameters, &vehicle.inputs}) {
     all.add(static_cast<int>(list->size()));
-    for (const int node : *list) add_variable(node);
+    variables.insert(variables.end(), list->begin(), list->end());
   }
-  all.add(static_cast<int>(vehicle.options.size()));
-  for (const auto& [node, value] : vehicle.options) add_variable(node);
   const std::vector<int> results = joined(vehicle.rates, vehicle.outputs);
-  for (const int node : graph.reach(results)) {
-    if (meanings.contains(node)) continue;
-    const Graph::Node& of = graph[node];
-    const int operands = operand_count(of.operation);
-    std::uint64_t first = operands > 0 ? meanings.at(of.a) : 0, second = operands > 1 ? meanings.at(of.b) : 0;
-    if ((of.operation == Operation::add || of.operation == Operation::multiply) && second < first)
-      std::swap(first, second);
-    Hash hash;
-    hash.add(static_cast<int>(of.operation));
-    if (of.operation == Operation::constant) hash.add(std::bit_cast<std::uint64_t>(of.value));
-    hash.add(first);
-    hash.add(second);
-    if (of.operation == Operation::power) hash.add(of.b);
-    meanings.emplace(node, hash.value());
-  }
+  const std::unordered_map<int, std::uint64_t> meanings = meanings_of(*vehicle.graph, results, variables);
   all.add(static_cast<int>(vehicle.rates.size()));
   for (const int node : results) all.add(meanings.at(node));
   return all.value();

@@ -31,6 +31,21 @@ std::vector<int> written_nodes(Graph& graph, const std::vector<Expression>& resu
   return nodes;
 }
 
+StraightMotion written_motion(Graph& graph, const Expression& ground_speed, const std::vector<Expression>& states,
+                              int state_count, const std::vector<Expression>& inputs, int input_count) {
+  StraightMotion made;
+  made.ground_speed = ground_speed.node_in(graph);
+  // What is left out is a state that stays as it is; written_nodes looks at those behind the last one.
+  std::vector<Expression> all = states;
+  for (int j = 0; j < state_count; ++j) {
+    made.states.push_back(all[j].is_set() ? all[j].node_in(graph) : -1);
+    if (!all[j].is_set()) all[j] = 0.0;
+  }
+  written_nodes(graph, all, state_count, "straight_motion");
+  made.inputs = written_nodes(graph, inputs, input_count, "straight_motion");
+  return made;
+}
+
 std::vector<Expression> new_variables(Graph& graph, const char* letter, int count,
                                       const std::vector<std::string>& names) {
   std::vector<Expression> variables;

@@ -60,16 +60,7 @@ ModelDescription describe() {
 
 class SkidSteerModel : public FormulaModel<SkidSteer> {
  public:
-  explicit SkidSteerModel(const Options& options)
-      : FormulaModel(options, describe(), skid_steer_kernels()), wheel_radius_(options.wheel_radius) {}
-
-  // No single input is the speed: each side has its own wheel speed and slip.
-  void straight_motion(double ground_speed, const double* p, double*, double* inputs) const noexcept override {
-    for (int side = 0; side < 2; ++side) inputs[side] = ground_speed / (wheel_radius_ * (1.0 - p[side]));
-  }
-
- private:
-  double wheel_radius_;
+  explicit SkidSteerModel(const Options& options) : FormulaModel(options, describe(), skid_steer_kernels()) {}
 };
 
 }  // namespace

@@ -52,6 +52,11 @@ struct SkidSteer {
     y[3] = (right - left) / track_width;
     y[4] = 0.5 * (left + right);
   }
+
+  // No single input is the speed: each side has its own wheel speed and slip.
+  void straight_motion(const Scalar& ground_speed, const Scalar* p, Scalar*, Scalar* u) const {
+    for (int side = 0; side < 2; ++side) u[side] = ground_speed / (wheel_radius * (1.0 - p[side]));
+  }
 };
 
 }  // namespace rhec

@@ -83,7 +83,7 @@ class VehicleBuilder {
     if (operations > most_operations)
       throw error_at(file_.name(), file_.place("equations", ""),
                      fmt::format("the equations have {} operations; expected at most {}", operations, most_operations));
-    return std::make_shared<GraphModel>(vehicle_, description_, file_.has_straight_motion() ? &straight_ : nullptr);
+    return std::make_shared<GraphModel>(vehicle_, description_);
   }
 
  private:
@@ -170,18 +170,19 @@ class VehicleBuilder {
   void build_straight_motion() {
     if (!file_.has_straight_motion()) return;
     std::map<std::string, int> known = options_.nodes();
-    straight_.ground_speed = graph().input("ground_speed");
-    known.emplace("ground_speed", straight_.ground_speed);
+    StraightMotion& straight = vehicle_.straight.emplace();
+    straight.ground_speed = graph().input("ground_speed");
+    known.emplace("ground_speed", straight.ground_speed);
     for (const Variable& parameter : description_.parameters)
       known.emplace(parameter.name, variables_.at(parameter.name));
     Definitions definitions(graph(), file_.name(), std::move(known),
                             "ground_speed, a parameter, an option, or a name that has an equation");
     definitions.add(file_.straight_motion());
     definitions.build();
-    for (const Variable& state : description_.states) straight_.states.push_back(definitions.node(state.name));
+    for (const Variable& state : description_.states) straight.states.push_back(definitions.node(state.name));
     for (const Variable& input : description_.inputs) {
-      straight_.inputs.push_back(definitions.node(input.name));
-      if (straight_.inputs.back() < 0)
+      straight.inputs.push_back(definitions.node(input.name));
+      if (straight.inputs.back() < 0)
         throw error_at(
             file_.name(), file_.place("straight_motion", ""),
             fmt::format("straight motion has no equation for the input '{0}'; expected {0} = ...", input.name));
@@ -192,7 +193,6 @@ class VehicleBuilder {
   ModelDescription description_;
   VehicleGraph vehicle_;
   OptionValues options_;
-  GraphModel::StraightMotion straight_;
   std::map<std::string, int> variables_;
 };
 

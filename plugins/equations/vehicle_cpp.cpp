@@ -127,6 +127,7 @@ class Writer {
     filling["OPTIONS"] = options();
     filling["DYNAMICS"] = function(true, uses_pi);
     filling["OUTPUTS"] = function(false, uses_pi);
+    filling["STRAIGHT_MOTION"] = straight_motion(uses_pi);
     filling["INCLUDES"] = uses_pi ? "#include <numbers>\n" : "";
     if (needs_limits_) filling["INCLUDES"] = "#include <limits>\n" + filling["INCLUDES"];
     const std::string source = description_.source.empty()
@@ -330,14 +331,9 @@ class Writer {
     filling["VARIABLES"] = variables;
     filling["ROLES"] = roles();
     bool uses_pi = terms.uses_pi();
-    const std::string straight = straight_motion(uses_pi);
-    filling["STRAIGHT_MOTION"] = straight;
     filling["REQUIRED"] = required();
-    filling["KEPT"] = straight.empty() ? "" : fmt::format("\n private:\n  {}<double> vehicle_;\n", class_);
-    filling["KEEP"] = straight.empty() ? "" : ", vehicle_(options)";
     std::string includes = uses_pi ? "#include <numbers>\n" : "";
-    if (!terms.called().empty() || !straight.empty() || filling["REQUIRED"] != "}")
-      includes = "#include <cmath>\n" + includes;
+    if (!terms.called().empty() || filling["REQUIRED"] != "}") includes = "#include <cmath>\n" + includes;
     filling["INCLUDES"] = includes.empty() ? includes : includes + "\n";
     return filled(source_template, filling);
   }
@@ -374,21 +370,25 @@ class Writer {
     return text.empty() ? "}" : "\n" + text + "  }";
   }
 
+  /// Straight motion of the formula, where the file says it; names of options are those of its members.
   std::string straight_motion(bool& uses_pi) {
     if (!file_.has_straight_motion()) return {};
     Graph graph;
     std::map<std::string, int> known{{"ground_speed", graph.input("ground_speed")}};
     CppNames names;
     for (const char* argument : {"ground_speed", "p", "state", "inputs"}) names.unused(argument);
-    for (const Option& option : file_.options()) known.emplace(option.name, graph.input(option.name));
+    for (const Option& option : file_.options()) {
+      known.emplace(option.name, graph.input(option.name));
+      names.unused(names_.of(option.name));
+    }
     for (const Variable& parameter : description_.parameters)
       known.emplace(parameter.name, graph.input(parameter.name));
     Definitions definitions(graph, file_.name(), known);
     definitions.add(file_.straight_motion());
     definitions.build();
-    CppTerms terms(definitions, names, "double");
+    CppTerms terms(definitions, names, "Scalar");
     terms.set("ground_speed", "ground_speed");
-    for (const Option& option : file_.options()) terms.set(option.name, "vehicle_." + names_.of(option.name));
+    for (const Option& option : file_.options()) terms.set(option.name, names_.of(option.name));
     for (std::size_t k = 0; k < description_.parameters.size(); ++k)
       terms.set(description_.parameters[k].name, fmt::format("p[{}]", k));
     std::string lines;
@@ -402,7 +402,7 @@ class Writer {
         return static_cast<std::size_t>(std::find_if(all.begin(), all.end(), is_it) - all.begin());
       };
       const std::size_t state = index_in(description_.states), input = index_in(description_.inputs);
-      std::string line = fmt::format("    const double {} = {};", names.of(statement.target), text);
+      std::string line = fmt::format("    const Scalar {} = {};", names.of(statement.target), text);
       if (state < description_.states.size()) {
         line += fmt::format("\n    state[{}] = {};", state, names.of(statement.target));
         has_states = true;
@@ -413,8 +413,8 @@ class Writer {
     }
     uses_pi = uses_pi || terms.uses_pi();
     return fmt::format(
-        "\n  void straight_motion(double ground_speed, const double* {}, double* {},\n"
-        "                       double* {}) const noexcept override {{\n{}{}  }}\n",
+        "\n  void straight_motion(const Scalar& ground_speed, const Scalar* {}, Scalar* {}, Scalar* {}) const {{\n{}{} "
+        " }}\n",
         has_parameters ? "p" : "/*p*/", has_states ? "state" : "/*state*/",
         description_.inputs.empty() ? "/*inputs*/" : "inputs", using_line(terms.called(), "    "), lines);
   }

@@ -24,7 +24,7 @@ struct @CLASS@ {
   template <class Visitor>
 @OPTIONS@
 @DYNAMICS@
-@OUTPUTS@};
+@OUTPUTS@@STRAIGHT_MOTION@};
 )";
 
 inline constexpr std::string_view source_template =
@@ -52,8 +52,8 @@ rhec::ModelDescription describe(@DESCRIBE_ARGUMENT@) {
 class @CLASS@Model : public rhec::FormulaModel<@CLASS@> {
  public:
   explicit @CLASS@Model(const Options& options)
-      : FormulaModel(options, @DESCRIBE_CALL@, rhec::@PLUGIN@_kernels())@KEEP@ {@REQUIRED@
-@STRAIGHT_MOTION@@KEPT@};
+      : FormulaModel(options, @DESCRIBE_CALL@, rhec::@PLUGIN@_kernels()) {@REQUIRED@
+};
 
 }  // namespace
 
@@ -84,6 +84,8 @@ or change the file and make the folder again.
     cmake -S . -B build
     cmake --build build
     rhec check @PLUGIN@ --plugin-path build
+
+With `-DRHEC_MODEL_INSTRUCTION_SETS=native` the first line has it compiled for this computer alone, which is quicker.
 
 | file | what it is |
 |---|---|

@@ -306,7 +306,8 @@ std::vector<Finding> check_straight_motion(const CheckedModel& checked) {
   };
   constexpr double direction = 0.7;  // arbitrary
   constexpr const char* advice =
-      "override Model::straight_motion, or mend roles.speed, speed_factor and nominal values";
+      "give the formula straight_motion (or override Model::straight_motion), or mend roles.speed, speed_factor and "
+      "nominal values";
   const Motion nominal = motion(nominal_values(about.parameters), direction);
   if (!(std::hypot(nominal.ahead - speed, nominal.sideways) <= exact * speed))
     findings.fail("at nominal parameters",

@@ -169,13 +169,13 @@ TEST(GraphModel, TakesManyStates) {
 }
 
 TEST(GraphModel, StraightMotionIsAGraphToo) {
-  const VehicleGraph vehicle = trace<SkidSteer>();
+  VehicleGraph vehicle = trace<SkidSteer>();
   Graph& graph = *vehicle.graph;
   const Expression speed = Expression::input(graph, "ground_speed"), slip(graph, vehicle.parameters[0]);
-  const GraphModel::StraightMotion straight{speed.node_in(graph),
-                                            {-1, (0.5 * speed).node_in(graph), -1},
-                                            {(speed / (1 - slip)).node_in(graph), (2 * speed).node_in(graph)}};
-  const GraphModel model(vehicle, describe<SkidSteer>(), &straight);
+  vehicle.straight = StraightMotion{speed.node_in(graph),
+                                    {-1, (0.5 * speed).node_in(graph), -1},
+                                    {(speed / (1 - slip)).node_in(graph), (2 * speed).node_in(graph)}};
+  const GraphModel model(vehicle, describe<SkidSteer>());
   double state[3] = {7, 7, 7}, inputs[2] = {};
   const double slips[3] = {0.5, 0.0, 0.0};
   model.straight_motion(3.0, slips, state, inputs);

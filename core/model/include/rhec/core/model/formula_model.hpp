@@ -16,6 +16,8 @@ namespace rhec {
 ///       template <class Visitor> void options(Visitor&& option) { option("length", length, "of the drawbar [m]"); }
 ///       void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const;
 ///       void outputs(const Scalar* x, Scalar* y) const;  // or (x, u, p, y)
+///       // Where no single variable is the speed: Model::straight_motion. A state that is left out stays as it is.
+///       void straight_motion(const Scalar& ground_speed, const Scalar* p, Scalar* x, Scalar* u) const;
 ///     };
 ///
 /// where Scalar behaves like a double: + - * /, sqrt exp log sin cos tan tanh asin acos atan atan2 hypot pow, called
@@ -32,13 +34,9 @@ class FormulaModel : public GraphModel {
   /// Throws Error as GraphModel does, and as `trace`.
   FormulaModel(const Formula<double>& formula, const ModelDescription& description,
                const StraightCode* kernels = nullptr)
-      : GraphModel(traced(formula, description), description, nullptr, kernels), formula_(formula) {}
+      : GraphModel(traced(formula, description), description, kernels) {}
   FormulaModel(const Formula<double>& formula, const ModelDescription& description, const StraightCode& kernels)
       : FormulaModel(formula, description, &kernels) {}
-
-  void rates(const double* x, const double* u, const double* p, double* dxdt) const noexcept override {
-    formula_.dynamics(x, u, p, dxdt);
-  }
 
  private:
   static VehicleGraph traced(const Formula<double>& formula, const ModelDescription& description) {
@@ -49,8 +47,6 @@ class FormulaModel : public GraphModel {
       throw Error("model '" + description.name + "': " + mistake.what());
     }
   }
-
-  Formula<double> formula_;
 };
 
 }  // namespace rhec

@@ -25,18 +25,10 @@ RHEC_EXPORT void check_description(const ModelDescription& description, const Fo
 /// after the other, each for all stages, and needs no compiler. Both give the same bits on the same instruction set.
 class RHEC_EXPORT GraphModel : public Model {
  public:
-  /// Straight motion as nodes of the vehicle's graph, of `ground_speed` and the parameters.
-  struct StraightMotion {
-    int ground_speed = -1;
-    std::vector<int> states;  ///< by state: what it becomes; -1 if it stays as it is
-    std::vector<int> inputs;  ///< by input
-  };
-
   /// Throws Error if the description has other numbers of variables than the graph.
-  /// Without `straight`, motion is straight as Model says. `code` was compiled of a formula; where that is another one,
-  /// or where it has no code for a function, the interpreter takes its place.
-  GraphModel(const VehicleGraph& vehicle, ModelDescription description, const StraightMotion* straight = nullptr,
-             const StraightCode* code = nullptr);
+  /// Without `vehicle.straight`, motion is straight as Model says. `code` was compiled of a formula; where that is
+  /// another one, or where it has no code for a function, the interpreter takes its place.
+  GraphModel(const VehicleGraph& vehicle, ModelDescription description, const StraightCode* code = nullptr);
   /// Doubles that `integrate` and `observe` take from the stack at most. Where they need more, which takes some forty
   /// states, they share memory that the model has from its set-up: then calls from several threads wait for each other.
   /// `integrate_rows` and `observe_rows` never do, for they have the caller's.

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <type_traits>
 #include <utility>
@@ -14,12 +15,20 @@
 
 namespace rhec {
 
+/// Straight motion as nodes of a vehicle's graph: functions of `ground_speed` [m/s] and the parameters.
+struct StraightMotion {
+  int ground_speed = -1;
+  std::vector<int> states;  ///< by state: what it becomes; -1 if it stays as it is
+  std::vector<int> inputs;  ///< by input
+};
+
 /// A vehicle's formula as nodes of a graph: dx/dt = f(x, u, p) and y = h(x, u, p).
 struct RHEC_EXPORT VehicleGraph {
   std::shared_ptr<Graph> graph = std::make_shared<Graph>();
   std::vector<int> states, inputs, parameters;  ///< independent variables
   std::vector<Tape::Known> options;             ///< independent variables whose values are known, e.g. lengths
   std::vector<int> rates, outputs;              ///< f and h
+  std::optional<StraightMotion> straight;       ///< where a vehicle says itself what drives it straight ahead
 };
 
 /// Numbers of variables of a formula.
@@ -44,6 +53,10 @@ RHEC_EXPORT std::vector<Expression> room_for_results(int count);
 /// out, or wrote one too many.
 RHEC_EXPORT std::vector<int> written_nodes(Graph& graph, const std::vector<Expression>& results, int count,
                                            const char* function);
+/// The nodes of straight motion; a state may be left out. Throws Error as `written_nodes` does, of "straight_motion".
+RHEC_EXPORT StraightMotion written_motion(Graph& graph, const Expression& ground_speed,
+                                          const std::vector<Expression>& states, int state_count,
+                                          const std::vector<Expression>& inputs, int input_count);
 /// `count` new independent variables with these names, or x0, x1, ... where there are not so many names.
 RHEC_EXPORT std::vector<Expression> new_variables(Graph& graph, const char* letter, int count,
                                                   const std::vector<std::string>& names);
@@ -76,6 +89,14 @@ VehicleGraph trace(const Formula<double>& values = {}, const VariableNames& name
   made.parameters = written_nodes(graph, p, n.parameters, "");
   made.rates = written_nodes(graph, rates, n.states, "dynamics");
   made.outputs = written_nodes(graph, outputs, n.outputs, "outputs");
+  if constexpr (requires(Expression * written) {
+                  std::as_const(formula).straight_motion(*written, p.data(), written, written);
+                }) {
+    const Expression speed = Expression::input(graph, "ground_speed");
+    std::vector<Expression> states = room_for_results(n.states), inputs = room_for_results(n.inputs);
+    std::as_const(formula).straight_motion(speed, p.data(), states.data(), inputs.data());
+    made.straight = written_motion(graph, speed, states, n.states, inputs, n.inputs);
+  }
   return made;
 }
 
