@@ -43,18 +43,19 @@ GraphModel::GraphModel(const VehicleGraph& vehicle, ModelDescription description
          static_cast<int>(vehicle.parameters.size()), static_cast<int>(vehicle.outputs.size())},
       code_(code && code->fingerprint == fingerprint_of(vehicle_) ? code : nullptr) {
   check_description(description_, {.states = n_.x, .inputs = n_.u, .parameters = n_.p, .outputs = n_.y});
-  const auto tape = [&](const std::vector<int>& inputs, const std::vector<int>& results) {
-    return Tape(*vehicle_.graph, inputs, results, vehicle_.options);
-  };
-  rates_ = tape(joined(vehicle_.states, vehicle_.parameters, vehicle_.inputs), vehicle_.rates);
-  if (const auto& straight = vehicle_.straight) {
-    std::vector<int> results = straight->inputs;
+  rates_ = Tape(*vehicle_.graph, joined(vehicle_.states, vehicle_.parameters, vehicle_.inputs), vehicle_.rates,
+                vehicle_.options);
+  if (vehicle.straight) {
+    const VehicleGraph motion = motion_copy(vehicle);
+    const StraightMotion& straight = *motion.straight;
+    std::vector<int> results = straight.inputs;
     for (int j = 0; j < n_.x; ++j) {
-      if (straight->states[j] < 0) continue;
+      if (straight.states[j] < 0) continue;
       straight_states_.push_back(j);
-      results.push_back(straight->states[j]);
+      results.push_back(straight.states[j]);
     }
-    straight_ = tape(joined(std::vector<int>{straight->ground_speed}, vehicle_.parameters), results);
+    straight_ = Tape(*motion.graph, joined(std::vector<int>{straight.ground_speed}, motion.parameters), results,
+                     motion.options);
   }
   GraphModel::use_instruction_set(GraphModel::instruction_sets().back());
 }

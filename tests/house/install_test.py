@@ -182,14 +182,14 @@ def check_template(home, arguments):
     sets that its models have.
     """
     blocks = RUN_BLOCK.findall((arguments.source / "docs" / "plugin.md").read_text())
-    expect(len(blocks) == 4, f"docs/plugin.md has {len(blocks)} blocks of commands that are run here, and not 4")
+    expect(len(blocks) == 5, f"docs/plugin.md has {len(blocks)} blocks of commands that are run here, and not 5")
     environment = CLEAN | {"HOME": str(home), "CXXFLAGS": arguments.cxxflags,
                            "PATH": f"{pathlib.Path(arguments.cmake).parent}:{CLEAN['PATH']}",
                            "RHEC_CONFORMANCE_FOLDER": str(home / "verdicts")}
     if arguments.cxx:
         environment["CXX"] = arguments.cxx
     script = "set -euo pipefail\n" + "".join(blocks).replace("build/release", shlex.quote(str(arguments.build.resolve())))
-    configure = "cmake -S my_robot -B my_robot/build"
+    configure = "cmake -S my_robot -B my_robot/build -DCMAKE_PREFIX_PATH=~/rhec"
     expect(script.count(configure) == 1, f"docs/plugin.md does not say '{configure}'")
     if arguments.instruction_sets:
         script = script.replace(configure, f"{configure} -DRHEC_MODEL_INSTRUCTION_SETS={shlex.quote(arguments.instruction_sets.replace(',', ';'))}")

@@ -46,5 +46,22 @@ TEST(FormulaCopy, TakesSomeOutputs) {
   EXPECT_EQ(copy.outputs[1], copy.states[0]);
 }
 
+TEST(FormulaCopy, HasStraightMotionApart) {
+  VehicleGraph vehicle = cart();
+  Graph& graph = *vehicle.graph;
+  const Expression speed = Expression::input(graph, "ground_speed"), gain(graph, vehicle.options[0].node);
+  vehicle.straight =
+      StraightMotion{speed.node_in(graph), {-1, (2.0 * speed).node_in(graph)}, {(speed / gain).node_in(graph)}};
+  EXPECT_FALSE(formula_copy(vehicle).straight.has_value());
+  const VehicleGraph copy = motion_copy(vehicle);
+  ASSERT_TRUE(copy.straight.has_value());
+  EXPECT_TRUE(copy.rates.empty());
+  EXPECT_EQ(copy.straight->states[0], -1);
+  const int wanted[] = {copy.straight->states[1], copy.straight->inputs[0]};
+  const int inputs[] = {copy.straight->ground_speed, copy.options[0].node};
+  const double values[] = {3.0, 2.0};
+  EXPECT_EQ(copy.graph->evaluate(wanted, inputs, values), (std::vector<double>{6.0, 1.5}));
+}
+
 }  // namespace formula_copy_test
 }  // namespace rhec

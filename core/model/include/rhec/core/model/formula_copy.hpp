@@ -14,4 +14,7 @@ RHEC_EXPORT VehicleGraph formula_copy(const VehicleGraph& vehicle);
 /// The same with some of its outputs.
 RHEC_EXPORT VehicleGraph formula_copy(const VehicleGraph& vehicle, std::span<const int> chosen_outputs);
 
+/// Its straight motion alone, with the same variables and options. `vehicle.straight` has to be set.
+RHEC_EXPORT VehicleGraph motion_copy(const VehicleGraph& vehicle);
+
 }  // namespace rhec
