@@ -1,15 +1,18 @@
 #include "consistency.hpp"
 
+#include <cmath>
 #include <limits>
 
-#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 
 #include "rhec/core/base/angle.hpp"
 
 namespace rhec::sim {
 namespace {
 
-constexpr double least_pivot = 1e-14;  // of a diagonal entry: smaller pivots are rounding errors
+/// The share of a variance that the other errors do not explain; below it a covariance is singular as far as its own
+/// rounding errors, and those of integration, allow to tell.
+constexpr double least_unexplained = 1e-9;
 
 }  // namespace
 
@@ -57,7 +60,7 @@ double Consistency::nees_with(const Eigen::MatrixXd& covariance) {
       pivot -= entry * value;
       z -= entry * solved_[j];
     }
-    if (!(pivot > least_pivot * covariance(i, i))) return nees_with_singular(covariance);
+    if (!(pivot > least_unexplained * covariance(i, i))) return nees_with_singular(covariance);
     factor_(i, i) = pivot;
     solved_[i] = z;
     sum += z * z / pivot;
@@ -66,9 +69,17 @@ double Consistency::nees_with(const Eigen::MatrixXd& covariance) {
 }
 
 double Consistency::nees_with_singular(const Eigen::MatrixXd& covariance) const {
-  const Eigen::LDLT<Eigen::MatrixXd> factor(covariance);
-  if (factor.info() != Eigen::Success) return std::numeric_limits<double>::quiet_NaN();
-  return error_.dot(factor.solve(error_));
+  if (!covariance.allFinite() || !error_.allFinite()) return std::numeric_limits<double>::quiet_NaN();
+  const Eigen::VectorXd scale =
+      covariance.diagonal().unaryExpr([](double variance) { return variance > 0.0 ? 1.0 / std::sqrt(variance) : 0.0; });
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> modes(scale.asDiagonal() * covariance * scale.asDiagonal());
+  const Eigen::VectorXd along = modes.eigenvectors().transpose() * scale.cwiseProduct(error_);
+  double sum = 0.0;
+  for (Eigen::Index j = 0; j < along.size(); ++j) {
+    const double variance = modes.eigenvalues()[j];
+    sum += variance > least_unexplained ? along[j] * along[j] / variance : 1.0;
+  }
+  return sum;
 }
 
 }  // namespace rhec::sim

@@ -11,8 +11,9 @@ class Consistency {
  public:
   explicit Consistency(const ModelDescription& about);
   /// Writes standard deviations and NEES of a sample whose truth and estimate are known; without a covariance (empty)
-  /// no standard deviations, and NaN. States of the
-  /// covariance behind those described are left out.
+  /// no standard deviations, and NaN. States of the covariance behind those described are left out. In a direction in
+  /// which the covariance is singular, as far as rounding errors allow to tell, it says nothing that an error could be
+  /// held against: there NEES has its expectation, 1.
   void write(const Eigen::MatrixXd& covariance, Sample& sample);
 
  private:

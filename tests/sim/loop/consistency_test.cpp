@@ -61,7 +61,22 @@ TEST(Consistency, IsFiniteWhereOneNumberIsKnownExactly) {
   covariance(0, 0) = 0.0;
   Sample sample = sample_with_error(0.0, 2.0, 1.0);
   consistency.write(covariance, sample);
-  EXPECT_NEAR(sample.nees, 5.0, 1e-12);
+  EXPECT_NEAR(sample.nees, 5.0 + 1.0, 1e-12);  // the number that is known exactly counts as is expected of one
+}
+
+// A chain of states far behind the only one that is measured: rounding errors alone make small variances negative.
+TEST(Consistency, IsThatOfTheDirectionsThatACovarianceResolves) {
+  const ModelDescription about = vehicle();
+  Consistency consistency(about);
+  const Eigen::Vector3d first(1.0, 2.0, -1.0), second(0.5, -0.1, 0.3);
+  for (const double rounding : {1e-15, -1e-15, 1e-13, -1e-13}) {
+    Eigen::MatrixXd covariance = first * first.transpose() + second * second.transpose();
+    covariance(2, 2) += rounding;
+    const Eigen::Vector3d error = 0.7 * first - 1.1 * second;
+    Sample sample = sample_with_error(error[0], error[1], error[2]);
+    consistency.write(covariance, sample);
+    EXPECT_NEAR(sample.nees, 0.7 * 0.7 + 1.1 * 1.1 + 1.0, 1e-9) << rounding;
+  }
 }
 
 }  // namespace consistency_test
