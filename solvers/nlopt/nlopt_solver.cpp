@@ -34,6 +34,8 @@ constexpr long longer_runs = 3;
 constexpr long patience = 300;
 // Iterations after which a run that restores feasibility has to have removed a part of the violation, with limits.
 constexpr long restoring_iterations = 100;
+// A gain of the merit, relative to it, for which a start is left although a run has failed.
+constexpr double clear_gain = 0.1;
 // How often all of it begins again at a point that violates less than this share of the least so far.
 constexpr int most_other_starts = 3;
 constexpr double clearly_less = 0.9;
@@ -441,6 +443,15 @@ Status NloptSolver::attempt(const Ocp& ocp, Answer& answer, long quota, Clock::t
     if (run.last_x() != run.x() && problem_.move_to(within_bounds(run.last_x())) && problem_.violation() < wanted) {
       Answer last = assess(problem_.x());
       if (last.kkt.largest() < wanted) next = std::move(last);
+    }
+    // Where it stops so far from a solution, its iterate may be far better than the start and violate a little more.
+    if (outcome == Run::Outcome::ended && run.gave_up() && next.kkt.largest() > near_solution &&
+        problem_.move_to(within_bounds(run.last_x()))) {
+      Answer last = assess(problem_.x());
+      if (last.merit < next.merit - clear_gain * (1.0 + std::abs(next.merit))) {
+        answer = std::move(last);
+        continue;
+      }
     }
     const bool stopped = outcome == Run::Outcome::deadline || outcome == Run::Outcome::iteration_limit;
     if (!stopped && options_.polish && next.kkt.largest() < near_solution) polish(ocp, next, deadline);
