@@ -263,8 +263,15 @@ bool GnRti::is_futile() noexcept {
 
 /// Where limits seem impossible to meet: looks for a point that violates less, from the last one and from the guess.
 /// Without one that claim is as good as it gets.
-bool GnRti::find_other_start(const Iterate& guess, Clock::time_point deadline) noexcept {
+/// From a point that meets all, where steps have come to a halt, the same goes on without the multipliers that led
+/// there.
+bool GnRti::find_other_start(const Iterate& guess, bool is_feasible, Clock::time_point deadline) noexcept {
   if (limits_.empty() || ++other_starts_ > most_other_starts) return false;
+  if (is_feasible) {
+    other_start_ = best_;
+    other_start_.clear_multipliers();
+    return true;
+  }
   for (const Iterate* from : {&guess, static_cast<const Iterate*>(&best_)})
     least_of_starts_ = std::min(least_of_starts_, search_.violation(*ocp_, *from, scratch_));
   const double wanted = clearly_less * least_of_starts_;
@@ -389,7 +396,7 @@ Report GnRti::converge(Iterate& iterate, Clock::time_point deadline) noexcept {
       report.status = late                                                           ? Status::deadline
                       : !is_feasible_point && (accepted || is_violated || !feasible) ? Status::infeasible
                                                                                      : Status::stalled;
-      if (late || is_feasible_point || !find_other_start(*guess, deadline)) break;
+      if (late || !find_other_start(*guess, is_feasible_point, deadline)) break;
       report.status = Status::iteration_limit;
       report.fallback_used = true;
       guess = &other_start_;

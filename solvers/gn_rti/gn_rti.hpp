@@ -79,7 +79,7 @@ class GnRti final : public Solver {
   void raise(double& penalty, double least) noexcept;
   bool is_futile() noexcept;
   void begin_at(const Iterate& guess) noexcept;
-  bool find_other_start(const Iterate& guess, Clock::time_point deadline) noexcept;
+  bool find_other_start(const Iterate& guess, bool is_feasible, Clock::time_point deadline) noexcept;
   StageQpSolver::Outcome solve_elastic(Report& report, Clock::time_point deadline) noexcept;
   bool search_along_step(Report& report, double residual, double& merit_after, Clock::time_point deadline) noexcept;
   bool correct_step(const StageQp& first, Report& report, Clock::time_point deadline) noexcept;
