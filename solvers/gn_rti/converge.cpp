@@ -33,6 +33,9 @@ constexpr double short_step = 0.2, halved = 0.5;
 constexpr int most_short_steps = 8;
 // How often steps at a price begin at the guess.
 constexpr int most_attempts = 2;
+// How often all of it begins again at a point that violates less than this share of the least so far.
+constexpr int most_other_starts = 3;
+constexpr double clearly_less = 0.9;
 // How often penalties fall.
 constexpr int most_penalty_cuts = 20;
 
@@ -258,21 +261,46 @@ bool GnRti::is_futile() noexcept {
   return ++futile_ > most_futile;
 }
 
-Report GnRti::converge(Iterate& iterate, Clock::time_point deadline) noexcept {
-  Report report;
+/// Where limits seem impossible to meet: looks for a point that violates less, from the last one and from the guess.
+/// Without one that claim is as good as it gets.
+/// From a point that meets all, where steps have come to a halt, the same goes on without the multipliers that led
+/// there.
+bool GnRti::find_other_start(const Iterate& guess, bool is_feasible, Clock::time_point deadline) noexcept {
+  if (limits_.empty() || ++other_starts_ > most_other_starts) return false;
+  if (is_feasible) {
+    other_start_ = best_;
+    other_start_.clear_multipliers();
+    return true;
+  }
+  for (const Iterate* from : {&guess, static_cast<const Iterate*>(&best_)})
+    least_of_starts_ = std::min(least_of_starts_, search_.violation(*ocp_, *from, scratch_));
+  const double wanted = clearly_less * least_of_starts_;
+  return search_.find(*ocp_, best_, wanted, deadline, scratch_, other_start_) ||
+         search_.find(*ocp_, guess, wanted, deadline, scratch_, other_start_);
+}
+
+void GnRti::begin_at(const Iterate& guess) noexcept {
   defect_penalty_ = bound_penalty_ = 0.0;
-  was_elastic_ = is_priced_ = false;
+  was_elastic_ = is_priced_ = use_exact_ = false;
   attempts_ = 0;
-  qp_solver_.set_cheap(false);
   futile_ = 0;
   penalty_cuts_left_ = most_penalty_cuts;
-  best_ = iterate;
+  best_ = guess;
   // The line search does not vary a given initial state.
   if (ocp_->initial_state()) std::copy_n(ocp_->initial_state(), ocp_->state_count(0), best_.state(0));
+}
+
+Report GnRti::converge(Iterate& iterate, Clock::time_point deadline) noexcept {
+  Report report;
+  qp_solver_.set_cheap(false);
+  other_starts_ = 0;
+  least_of_starts_ = std::numeric_limits<double>::infinity();
+  const Iterate* guess = &iterate;
+  begin_at(*guess);
   report.status = Status::iteration_limit;
   double least_residual = std::numeric_limits<double>::infinity(), last_residual = least_residual;
   double halved_residual = least_residual;
-  int slow = 0, short_steps = 0, stagnant = 0;
+  int slow = 0, short_steps = 0, stagnant = 0, first_iteration = 0;
   for (;; ++report.iterations) {
     linearise(best_);
     report.kkt = kkt_residual(*qp_, best_);
@@ -298,8 +326,8 @@ Report GnRti::converge(Iterate& iterate, Clock::time_point deadline) noexcept {
     }
     least_residual = std::min(least_residual, residual);
 
-    if (!limits_.empty() && !is_priced_ && is_violation_stuck(report.iterations)) {
-      begin_priced_at(iterate);
+    if (!limits_.empty() && !is_priced_ && is_violation_stuck(report.iterations - first_iteration)) {
+      begin_priced_at(*guess);
       continue;
     }
     // Damped steps do better than short ones, and than those of a Hessian that is not convex.
@@ -358,7 +386,7 @@ Report GnRti::converge(Iterate& iterate, Clock::time_point deadline) noexcept {
     // The least violation around one point need not be the least of all: from a guess that is left in another direction
     // there may be none.
     if ((!accepted || is_hopeless) && !late && !limits_.empty() && attempts_ < most_attempts) {
-      begin_priced_at(iterate);
+      begin_priced_at(*guess);
       continue;
     }
     if (!accepted || is_hopeless) {
@@ -368,7 +396,15 @@ Report GnRti::converge(Iterate& iterate, Clock::time_point deadline) noexcept {
       report.status = late                                                           ? Status::deadline
                       : !is_feasible_point && (accepted || is_violated || !feasible) ? Status::infeasible
                                                                                      : Status::stalled;
-      break;
+      if (late || !find_other_start(*guess, is_feasible_point, deadline)) break;
+      report.status = Status::iteration_limit;
+      report.fallback_used = true;
+      guess = &other_start_;
+      begin_at(*guess);
+      least_residual = last_residual = halved_residual = std::numeric_limits<double>::infinity();
+      slow = short_steps = stagnant = 0;
+      first_iteration = report.iterations + 1;
+      continue;
     }
     short_steps = step_length_ < short_step ? short_steps + 1 : 0;
     std::swap(best_, trial_);

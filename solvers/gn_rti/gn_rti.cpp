@@ -85,6 +85,10 @@ void GnRti::setup(const Ocp& ocp) {
   qp_ = &linearisation_->qp();
   qp_solver_ = StageQpSolver(capacity);
   for (Iterate* iterate : {&step_, &trial_, &best_, &other_trial_, &first_step_}) *iterate = Iterate(capacity);
+  if (capacity.limits > 0) {
+    other_start_ = Iterate(capacity);
+    search_.setup(ocp);
+  }
   scratch_.assign(ocp.scratch_size(), 0.0);
   if (options_.hessian == Curvature::automatic && options_.mode == Mode::rti) choice_.setup(ocp);
   limits_.assign((static_cast<std::size_t>(capacity.intervals) + 1) * capacity.limit_row(), 0.0);

@@ -8,6 +8,7 @@
 #include "rhec/core/ocp/linearisation.hpp"
 #include "rhec/core/ocp/ocp.hpp"
 #include "rhec/core/ocp/solver.hpp"
+#include "rhec/core/ocp/start_search.hpp"
 #include "rhec/core/qp/stage_qp_solver.hpp"
 
 namespace rhec::gn_rti {
@@ -77,6 +78,8 @@ class GnRti final : public Solver {
                                               Clock::time_point deadline) noexcept;
   void raise(double& penalty, double least) noexcept;
   bool is_futile() noexcept;
+  void begin_at(const Iterate& guess) noexcept;
+  bool find_other_start(const Iterate& guess, bool is_feasible, Clock::time_point deadline) noexcept;
   StageQpSolver::Outcome solve_elastic(Report& report, Clock::time_point deadline) noexcept;
   bool search_along_step(Report& report, double residual, double& merit_after, Clock::time_point deadline) noexcept;
   bool correct_step(const StageQp& first, Report& report, Clock::time_point deadline) noexcept;
@@ -120,6 +123,11 @@ class GnRti final : public Solver {
   double first_violation_ = 0.0,
          least_violation_ = 0.0;  ///< of the hard limits, and at which iteration it was half of that before
   int least_violation_at_ = 0;
+  // Where limits seem impossible to meet.
+  StartSearch search_;
+  Iterate other_start_;
+  int other_starts_ = 0;
+  double least_of_starts_ = 0.0;  ///< violation
 };
 
 }  // namespace rhec::gn_rti

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <exception>
 #include <limits>
+#include <utility>
 
 #include <IpoptConfig.h>
 
@@ -37,6 +38,9 @@ constexpr double flat = 3e-4;
 /// Of all solves of ViolationNlp together, which take up to 120 on the problems of the conformance suite.
 constexpr int most_iterations_of_violation = 300;
 constexpr int most_solves_of_violation = 5;
+/// How often a run begins at a point that violates less than this share of the least so far.
+constexpr int most_other_starts = 3;
+constexpr double clearly_less = 0.9;
 constexpr double tolerance_of_violation = 1e-11;
 /// Initial barrier parameter of a warm start, relative to the guess' residual, and its limits.
 constexpr double warm_barrier_share = 1e-4;
@@ -160,6 +164,7 @@ void IpoptSolver::setup(const Ocp& ocp) {
   scratch_.assign(ocp.scratch_size(), 0.0);
   assessed_ = StageQp(ocp.capacity(), OcpNlp::window);
   guess_ = best_ = nearest_ = Iterate(ocp.capacity());
+  if (ocp.capacity().limits > 0) search_.setup(ocp);
   const std::lock_guard hold(backend_lock());
   nlp_ = new OcpNlp(ocp, options_.hessian);
 }
@@ -282,7 +287,7 @@ IpoptSolver::Ending IpoptSolver::run(Start start) {
 /// Whether the violation of the constraints has a minimum near the guess that is not zero; `nearest_` is that point, or
 /// the last one. The iterations are not of the problem itself, and not counted.
 bool IpoptSolver::is_infeasible() {
-  nearest_ = guess_;
+  if (other_starts_ == 0) nearest_ = guess_;
   is_judged_ = true;
   may_be_stuck_ = is_stuck_ = false;
   int left = std::min(options_.max_iterations, most_iterations_of_violation);
@@ -298,13 +303,30 @@ bool IpoptSolver::is_infeasible() {
     if (!std::isfinite(violation->largest())) return false;
     nlp_->write(violation->point(), nearest_);
     if (violation->largest() <= clear_violation) return false;
-    if (violation->slope() <= flat) return true;
+    if (violation->slope() <= flat) return !find_other_start();
     // What was stopped has not succeeded.
-    if (outcome != Ipopt::Solve_Succeeded && outcome != Ipopt::Solved_To_Acceptable_Level) return false;
+    if (outcome != Ipopt::Solve_Succeeded && outcome != Ipopt::Solved_To_Acceptable_Level) {
+      find_other_start();
+      return false;
+    }
     // What is left of the slope is the pull of the point at which it began: again, from where it has come to.
     left -= std::max(violation->iterations(), 1);
   }
   return false;
+}
+
+/// A point without slope need not be a minimum: looks for one that violates less than the least of all starts so far,
+/// from the point that was found and from the guess. `nearest_` is that one, and all is open again.
+bool IpoptSolver::find_other_start() {
+  if (ocp_->capacity().limits == 0 || ++other_starts_ > most_other_starts) return false;
+  for (const Iterate* from : {&guess_, &nearest_})
+    least_of_starts_ = std::min(least_of_starts_, search_.violation(*ocp_, *from, scratch_));
+  const double wanted = clearly_less * least_of_starts_;
+  if (!search_.find(*ocp_, nearest_, wanted, deadline_, scratch_, nearest_) &&
+      !search_.find(*ocp_, guess_, wanted, deadline_, scratch_, nearest_))
+    return false;
+  is_judged_ = false;
+  return has_other_start_ = true;
 }
 
 /// True if `iterate` was replaced by the best iterate; then `report` has its objective and KKT residual.
@@ -358,6 +380,10 @@ bool IpoptSolver::improve(const Ocp& ocp, Iterate& iterate, Report& report) {
           }
         }
         if (ending == Ending::out_of_iterations) break;
+        if (std::exchange(has_other_start_, false)) {
+          start = Start::nearest;
+          continue;
+        }
         if ((is_last || is_claim) && !was_near) {
           was_near = true;
           start = Start::nearest;
@@ -403,7 +429,9 @@ Report IpoptSolver::solve(Iterate& iterate, Clock::time_point deadline) noexcept
   deadline_ = deadline;
   iterations_ = 0;
   backend_us_ = 0.0;
-  stopped_late_ = is_judged_ = false;
+  stopped_late_ = is_judged_ = has_other_start_ = false;
+  other_starts_ = 0;
+  least_of_starts_ = std::numeric_limits<double>::infinity();
   bool is_assessed = false;
   try {
     std::unique_lock hold(backend_lock(), std::defer_lock);

@@ -9,6 +9,7 @@
 #include "ocp_nlp.hpp"
 #include "rhec/core/config/options.hpp"
 #include "rhec/core/ocp/solver.hpp"
+#include "rhec/core/ocp/start_search.hpp"
 
 namespace rhec::ipopt {
 
@@ -36,7 +37,8 @@ struct IpoptOptions {
 /// Where a run says that constraints cannot be met, is in restoration for long, or has not met them from the guess
 /// alone, the violation alone is minimised from the guess (ViolationNlp), once, with a budget of its own. The problem
 /// is infeasible if that ends where the violation is stationary and not zero; otherwise a run begins at the point that
-/// was found, after such a claim or where no other has met them, if there are iterations left.
+/// was found, after such a claim or where no other has met them, if there are iterations left. Before a problem is
+/// called infeasible, moves of some size are tried (StartSearch).
 ///
 /// Ipopt 3.11 has a global counter and MUMPS keeps global state, so solves are serialised across the process; waiting
 /// counts towards the deadline. Every solve builds Ipopt's algorithm anew, so only the guess carries over from one
@@ -77,6 +79,7 @@ class IpoptSolver final : public Solver, private Spectator {
   Ipopt::ApplicationReturnStatus optimize(const Ipopt::SmartPtr<Ipopt::TNLP>& nlp);
   Ending run(Start start);
   bool is_infeasible();
+  bool find_other_start();
   Start start_after(Start start, Ending ending) const noexcept;
   int iterations_of(Start start) const noexcept;
   void set_run_options(Start start, double barrier);
@@ -105,10 +108,14 @@ class IpoptSolver final : public Solver, private Spectator {
   KktResidual best_kkt_, seen_kkt_;
   double best_objective_ = 0.0, backend_us_ = 0.0;
   bool stopped_late_ = false;
-  bool is_judged_ = false;     ///< the least violation was looked for
-  bool may_be_stuck_ = false;  ///< a restoration that takes long ends the run
-  bool is_stuck_ = false;      ///< one has
-  int restoring_ = 0;          ///< iterations of the present restoration
+  StartSearch search_;
+  int other_starts_ = 0;
+  double least_of_starts_ = 0.0;  ///< violation
+  bool has_other_start_ = false;  ///< `nearest_` is one from which no run has begun
+  bool is_judged_ = false;        ///< the least violation was looked for
+  bool may_be_stuck_ = false;     ///< a restoration that takes long ends the run
+  bool is_stuck_ = false;         ///< one has
+  int restoring_ = 0;             ///< iterations of the present restoration
   int iterations_ = 0;
   int spare_iterations_ = 0;  ///< left for the barrier to become negligible once the residual is within the tolerance
 };

@@ -289,6 +289,7 @@ Run::Outcome Run::optimise() {
   double value = 0.0;
   const nlopt_result result = nlopt_optimize(optimiser_, y.data(), &value);
   optimiser_ = nullptr;
+  gave_up_ = result == NLOPT_ROUNDOFF_LIMITED;
   const auto within = [&](const Vector& x) -> Vector {
     return x.cwiseMax(problem_.lower()).cwiseMin(problem_.upper());
   };

@@ -46,6 +46,8 @@ class Run {
   const Eigen::VectorXd& x() const noexcept { return best_x_; }
   /// The last iterate that was counted as an iteration, feasible or not.
   const Eigen::VectorXd& last_x() const noexcept { return last_counted_; }
+  /// Whether NLopt stopped because rounding, or linearised constraints without a solution, left it no step.
+  bool gave_up() const noexcept { return gave_up_; }
   /// Number of points at which NLopt asked for derivatives, or for values if it never asks for derivatives.
   long iterations() const noexcept { return iterations_; }
 
@@ -85,6 +87,7 @@ class Run {
   int returns_ = 0;  ///< evaluations repeated at the iterate counted last
   nlopt_opt optimiser_ = nullptr;
   Outcome outcome_ = Outcome::ended;
+  bool gave_up_ = false;
   bool was_stopped_ = false;
   std::vector<Constraint> inequalities_, equalities_;
   double violation_weight_ = 1.0;

@@ -34,6 +34,11 @@ constexpr long longer_runs = 3;
 constexpr long patience = 300;
 // Iterations after which a run that restores feasibility has to have removed a part of the violation, with limits.
 constexpr long restoring_iterations = 100;
+// A gain of the merit, relative to it, for which a start is left although a run has failed.
+constexpr double clear_gain = 0.1;
+// How often all of it begins again at a point that violates less than this share of the least so far.
+constexpr int most_other_starts = 3;
+constexpr double clearly_less = 0.9;
 // Distances within which a bound may have a multiplier: the one of the smallest residual is taken.
 constexpr double distances[] = {1e-9, 1e-6, 1e-4};
 // Curvature is raised to at least this share of the largest.
@@ -134,6 +139,7 @@ void NloptSolver::setup(const Ocp& ocp) {
   if (const std::string reason = why_not(ocp); !reason.empty()) throw Error("solver 'nlopt': " + reason);
   ocp_ = &ocp;
   problem_ = CondensedProblem(ocp);
+  if (ocp.capacity().limits > 0) search_.setup(ocp);
   qp_ = StageQp(ocp.capacity());
   scratch_.assign(ocp.scratch_size(), 0.0);
 }
@@ -176,7 +182,16 @@ Report NloptSolver::optimise(const Ocp& ocp, Iterate& iterate, Clock::time_point
 
   if (problem_.has_slacks()) problem_.move_to(problem_.with_fitting_slacks());
   Answer answer = assess(problem_.x());
-  const Status status = improve(ocp, answer, deadline);
+  Status status = improve(ocp, answer, deadline);
+  double least = HUGE_VAL;
+  const auto may_be_misled = [&] {
+    return status == Status::infeasible || (status == Status::stalled && answer.violation > infeasible_beyond);
+  };
+  for (int starts = 0; may_be_misled() && starts < most_other_starts && iterations_left() > 0; ++starts) {
+    if (!find_other_start(ocp, iterate, answer, least, deadline)) break;
+    fallback_used_ = true;
+    status = improve(ocp, answer, deadline);
+  }
   report.iterations = static_cast<int>(iterations_);
   if (status == Status::infeasible) return leave_as_it_was(status);
   problem_.move_to(answer.x);
@@ -186,6 +201,24 @@ Report NloptSolver::optimise(const Ocp& ocp, Iterate& iterate, Clock::time_point
   report.kkt = problem_.residual();
   iterate = problem_.iterate();
   return report;
+}
+
+/// Where limits seem impossible to meet: looks for a point that violates less than the least of all starts so far, from
+/// the last one and from the guess. Without one that claim is as good as it gets.
+bool NloptSolver::find_other_start(const Ocp& ocp, const Iterate& guess, Answer& answer, double& least,
+                                   Clock::time_point deadline) {
+  if (!problem_.has_limits()) return false;
+  problem_.move_to(answer.x);
+  Iterate other = problem_.iterate();
+  for (const Iterate* from : {&guess, static_cast<const Iterate*>(&other)})
+    least = std::min(least, search_.violation(ocp, *from, scratch_));
+  if (!search_.find(ocp, other, clearly_less * least, deadline, scratch_, other) &&
+      !search_.find(ocp, guess, clearly_less * least, deadline, scratch_, other))
+    return false;
+  if (!problem_.move_to(problem_.read(other))) return false;
+  if (problem_.has_slacks()) problem_.move_to(problem_.with_fitting_slacks());
+  answer = assess(problem_.x());
+  return true;
 }
 
 /// Simulates the guess. If the result is not finite, controls closer to zero are tried.
@@ -374,7 +407,7 @@ Status NloptSolver::improve(const Ocp& ocp, Answer& answer, Clock::time_point de
   const bool may_retry = quota > 0 && problem_.variables() > 0 && problem_.variables() <= many_variables;
   if (!may_retry) return attempt(ocp, answer, quota, deadline);
   Answer other = answer;
-  limit_ = std::min<long>(options_.max_iterations, patience);
+  limit_ = std::min<long>(options_.max_iterations, iterations_ + patience);
   const Status status = attempt(ocp, answer, quota, deadline);
   limit_ = options_.max_iterations;
   const bool is_stuck = status == Status::stalled || status == Status::iteration_limit;
@@ -410,6 +443,15 @@ Status NloptSolver::attempt(const Ocp& ocp, Answer& answer, long quota, Clock::t
     if (run.last_x() != run.x() && problem_.move_to(within_bounds(run.last_x())) && problem_.violation() < wanted) {
       Answer last = assess(problem_.x());
       if (last.kkt.largest() < wanted) next = std::move(last);
+    }
+    // Where it stops so far from a solution, its iterate may be far better than the start and violate a little more.
+    if (outcome == Run::Outcome::ended && run.gave_up() && next.kkt.largest() > near_solution &&
+        problem_.move_to(within_bounds(run.last_x()))) {
+      Answer last = assess(problem_.x());
+      if (last.merit < next.merit - clear_gain * (1.0 + std::abs(next.merit))) {
+        answer = std::move(last);
+        continue;
+      }
     }
     const bool stopped = outcome == Run::Outcome::deadline || outcome == Run::Outcome::iteration_limit;
     if (!stopped && options_.polish && next.kkt.largest() < near_solution) polish(ocp, next, deadline);

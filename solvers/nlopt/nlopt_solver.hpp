@@ -6,6 +6,7 @@
 #include "nlopt_options.hpp"
 #include "nlopt_run.hpp"
 #include "rhec/core/ocp/solver.hpp"
+#include "rhec/core/ocp/start_search.hpp"
 
 namespace rhec::nlopt {
 
@@ -50,6 +51,8 @@ class NloptSolver final : public Solver {
   Status attempt(const Ocp& ocp, Answer& answer, long quota, Clock::time_point deadline);
   Status restore_feasibility(const Ocp& ocp, Answer& answer, Clock::time_point deadline);
   bool find_start(const Ocp& ocp, const Iterate& iterate);
+  bool find_other_start(const Ocp& ocp, const Iterate& guess, Answer& answer, double& least,
+                        Clock::time_point deadline);
   Eigen::VectorXd within_bounds(const Eigen::VectorXd& x) const;
   Answer assess(const Eigen::VectorXd& x);
   /// The Answer at the problem's current iterate with given multipliers.
@@ -67,6 +70,7 @@ class NloptSolver final : public Solver {
   CondensedProblem problem_;
   std::vector<double> scratch_;
   StageQp qp_;
+  StartSearch search_;
   int factorisations_ = 0;
   long iterations_ = 0;
   long limit_ = 0;  ///< of the iterations, for the current attempt

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "rhec/core/config/options.hpp"
+#include "rhec/core/ocp/start_search.hpp"
 #include "row_costs.hpp"
 #include "sparse_qp.hpp"
 
@@ -56,6 +57,7 @@ class SparseSqp final : public Solver {
   bool search(const Ocp& ocp, double residual, double& after);
   void polish(const Ocp& ocp, Report& report, Clock::time_point deadline);
   Status converge(const Ocp& ocp, Report& report, Clock::time_point deadline);
+  bool find_other_start(const Ocp& ocp, const Iterate& guess, double& least, Clock::time_point deadline);
   SparseQp::Outcome find_step(const Ocp& ocp, Report& report, Clock::time_point deadline);
   SparseQp::Outcome find_relaxed_step(Clock::time_point deadline);
   SparseQp::Outcome solve_relaxed(double penalty, Clock::time_point deadline);
@@ -93,7 +95,8 @@ class SparseSqp final : public Solver {
   double predicted_defect_ = 0.0;  ///< |J step + c|_1
   double predicted_slack_cost_ = 0.0;
   bool is_elastic_ = false;  ///< the next QP is relaxed from the start
-  int futile_ = 0;           ///< relaxed steps since |c|_1 was this:
+  StartSearch search_;
+  int futile_ = 0;  ///< relaxed steps since |c|_1 was this:
   double defect_before_ = 0.0;
 };
 

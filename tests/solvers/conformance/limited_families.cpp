@@ -260,6 +260,29 @@ std::vector<Limit> equations(const Stage& stage) {
   return {limit};
 }
 
+/// Circles about places of the guess itself, where the distance from the centre has no gradient; the gentler drive is
+/// outside of them. At every third node, or at all.
+std::vector<Limit> about_the_guess(const Stage& stage, int every) {
+  if (stage.index == 0 || stage.index % every != 0) return {};
+  std::vector<double> centre;
+  for (const int j : stage.position()) centre.push_back(stage.drive[j]);
+  Limit limit{Limit::Kind::distance, stage.position(), centre};
+  limit.lower = 0.7 * limit.value(stage.gentle);
+  return {limit};
+}
+
+/// The same, and what the circle at the middle forbids is demanded there.
+std::vector<Limit> kept_to_the_guess(const Stage& stage) {
+  std::vector<Limit> all = about_the_guess(stage, 3);
+  if (stage.index != stage.last / 2) return all;
+  all = about_the_guess(stage, 1);
+  Limit inside = all.front();
+  inside.upper = 0.5 * (inside.lower + inside.value(stage.drive));
+  inside.lower = -infinity;
+  all.push_back(inside);
+  return all;
+}
+
 /// Units from where a limit is hardly seen to where it is all that is.
 Limits in_other_units() {
   return [](const Stage& stage, RandomProblem& random) {
@@ -372,6 +395,18 @@ std::vector<Family> limited_families() {
       of_any_length(on_its_path(), of_mixed_kind()))
       .several_optima = true;
   add("rhe_limits_mixed", "the same on estimates", of_any_length(RheSpec{}, of_mixed_kind())).several_optima = true;
+  add("rhc_limits_at_centre", "circles about places of the guess, where the distance has no gradient",
+      limited(on_its_path(), with([](const Stage& stage) { return about_the_guess(stage, 3); })))
+      .several_optima = true;
+  add("rhc_limits_at_all_centres", "the same at every node",
+      limited(on_its_path(), with([](const Stage& stage) { return about_the_guess(stage, 1); })))
+      .several_optima = true;
+  add("rhe_limits_at_centre", "the same on estimates",
+      limited(RheSpec{}, with([](const Stage& stage) { return about_the_guess(stage, 3); })))
+      .several_optima = true;
+  add("rhc_limits_at_centre_infeasible", "a circle about a place of the guess that is to be left and kept to",
+      limited(on_its_path(), with(kept_to_the_guess)))
+      .answer = Family::Answer::infeasible;
   return all;
 }
 
