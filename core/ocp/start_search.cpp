@@ -13,6 +13,9 @@ constexpr double lengths[] = {0.01, 0.03, 0.1, 0.3, 1.0};
 // A move helps if it leaves less than this share of the violation.
 constexpr double less = 0.99;
 constexpr int most_trials = 1000;
+// How often a solve begins again, each time at a point that violates less than this share of the least so far.
+constexpr int most_starts = 3;
+constexpr double clearly_less = 0.9;
 // How many intervals before the worst node a local pattern begins at.
 constexpr int local_intervals = 8;
 constexpr int patterns = 6;
@@ -56,6 +59,21 @@ void StartSearch::setup(const Ocp& ocp) {
   limits_.assign((static_cast<std::size_t>(capacity.intervals) + 1) * capacity.limit_row(), 0.0);
   control_scales_.assign(capacity.controls, 0.0);
   state_scales_.assign(capacity.states, 0.0);
+}
+
+void StartSearch::begin() noexcept {
+  starts_ = 0;
+  least_ = infinity;
+}
+
+bool StartSearch::take_start() noexcept { return ++starts_ <= most_starts; }
+
+bool StartSearch::find_other(const Ocp& ocp, const Iterate& guess, const Iterate& last, Clock::time_point deadline,
+                             std::span<double> scratch, Iterate& to) noexcept {
+  if (ocp.capacity().limits == 0 || !take_start()) return false;
+  for (const Iterate* from : {&guess, &last}) least_ = std::min(least_, violation(ocp, *from, scratch));
+  return find(ocp, last, clearly_less * least_, deadline, scratch, to) ||
+         find(ocp, guess, clearly_less * least_, deadline, scratch, to);
 }
 
 /// Of `trial_`, which is simulated.

@@ -33,9 +33,6 @@ constexpr double short_step = 0.2, halved = 0.5;
 constexpr int most_short_steps = 8;
 // How often steps at a price begin at the guess.
 constexpr int most_attempts = 2;
-// How often all of it begins again at a point that violates less than this share of the least so far.
-constexpr int most_other_starts = 3;
-constexpr double clearly_less = 0.9;
 // How often penalties fall.
 constexpr int most_penalty_cuts = 20;
 
@@ -266,17 +263,14 @@ bool GnRti::is_futile() noexcept {
 /// From a point that meets all, where steps have come to a halt, the same goes on without the multipliers that led
 /// there.
 bool GnRti::find_other_start(const Iterate& guess, bool is_feasible, Clock::time_point deadline) noexcept {
-  if (limits_.empty() || ++other_starts_ > most_other_starts) return false;
+  if (limits_.empty()) return false;
   if (is_feasible) {
+    if (!search_.take_start()) return false;
     other_start_ = best_;
     other_start_.clear_multipliers();
     return true;
   }
-  for (const Iterate* from : {&guess, static_cast<const Iterate*>(&best_)})
-    least_of_starts_ = std::min(least_of_starts_, search_.violation(*ocp_, *from, scratch_));
-  const double wanted = clearly_less * least_of_starts_;
-  return search_.find(*ocp_, best_, wanted, deadline, scratch_, other_start_) ||
-         search_.find(*ocp_, guess, wanted, deadline, scratch_, other_start_);
+  return search_.find_other(*ocp_, guess, best_, deadline, scratch_, other_start_);
 }
 
 void GnRti::begin_at(const Iterate& guess) noexcept {
@@ -293,8 +287,7 @@ void GnRti::begin_at(const Iterate& guess) noexcept {
 Report GnRti::converge(Iterate& iterate, Clock::time_point deadline) noexcept {
   Report report;
   qp_solver_.set_cheap(false);
-  other_starts_ = 0;
-  least_of_starts_ = std::numeric_limits<double>::infinity();
+  search_.begin();
   const Iterate* guess = &iterate;
   begin_at(*guess);
   report.status = Status::iteration_limit;

@@ -126,8 +126,6 @@ class GnRti final : public Solver {
   // Where limits seem impossible to meet.
   StartSearch search_;
   Iterate other_start_;
-  int other_starts_ = 0;
-  double least_of_starts_ = 0.0;  ///< violation
 };
 
 }  // namespace rhec::gn_rti

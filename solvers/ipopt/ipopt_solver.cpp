@@ -38,9 +38,6 @@ constexpr double flat = 3e-4;
 /// Of all solves of ViolationNlp together, which take up to 120 on the problems of the conformance suite.
 constexpr int most_iterations_of_violation = 300;
 constexpr int most_solves_of_violation = 5;
-/// How often a run begins at a point that violates less than this share of the least so far.
-constexpr int most_other_starts = 3;
-constexpr double clearly_less = 0.9;
 constexpr double tolerance_of_violation = 1e-11;
 /// Initial barrier parameter of a warm start, relative to the guess' residual, and its limits.
 constexpr double warm_barrier_share = 1e-4;
@@ -287,7 +284,7 @@ IpoptSolver::Ending IpoptSolver::run(Start start) {
 /// Whether the violation of the constraints has a minimum near the guess that is not zero; `nearest_` is that point, or
 /// the last one. The iterations are not of the problem itself, and not counted.
 bool IpoptSolver::is_infeasible() {
-  if (other_starts_ == 0) nearest_ = guess_;
+  if (search_.starts() == 0) nearest_ = guess_;
   is_judged_ = true;
   may_be_stuck_ = is_stuck_ = false;
   int left = std::min(options_.max_iterations, most_iterations_of_violation);
@@ -318,13 +315,7 @@ bool IpoptSolver::is_infeasible() {
 /// A point without slope need not be a minimum: looks for one that violates less than the least of all starts so far,
 /// from the point that was found and from the guess. `nearest_` is that one, and all is open again.
 bool IpoptSolver::find_other_start() {
-  if (ocp_->capacity().limits == 0 || ++other_starts_ > most_other_starts) return false;
-  for (const Iterate* from : {&guess_, &nearest_})
-    least_of_starts_ = std::min(least_of_starts_, search_.violation(*ocp_, *from, scratch_));
-  const double wanted = clearly_less * least_of_starts_;
-  if (!search_.find(*ocp_, nearest_, wanted, deadline_, scratch_, nearest_) &&
-      !search_.find(*ocp_, guess_, wanted, deadline_, scratch_, nearest_))
-    return false;
+  if (!search_.find_other(*ocp_, guess_, nearest_, deadline_, scratch_, nearest_)) return false;
   is_judged_ = false;
   return has_other_start_ = true;
 }
@@ -430,8 +421,7 @@ Report IpoptSolver::solve(Iterate& iterate, Clock::time_point deadline) noexcept
   iterations_ = 0;
   backend_us_ = 0.0;
   stopped_late_ = is_judged_ = has_other_start_ = false;
-  other_starts_ = 0;
-  least_of_starts_ = std::numeric_limits<double>::infinity();
+  search_.begin();
   bool is_assessed = false;
   try {
     std::unique_lock hold(backend_lock(), std::defer_lock);

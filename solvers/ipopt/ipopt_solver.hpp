@@ -109,8 +109,6 @@ class IpoptSolver final : public Solver, private Spectator {
   double best_objective_ = 0.0, backend_us_ = 0.0;
   bool stopped_late_ = false;
   StartSearch search_;
-  int other_starts_ = 0;
-  double least_of_starts_ = 0.0;  ///< violation
   bool has_other_start_ = false;  ///< `nearest_` is one from which no run has begun
   bool is_judged_ = false;        ///< the least violation was looked for
   bool may_be_stuck_ = false;     ///< a restoration that takes long ends the run

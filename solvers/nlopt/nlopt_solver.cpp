@@ -36,9 +36,6 @@ constexpr long patience = 300;
 constexpr long restoring_iterations = 100;
 // A gain of the merit, relative to it, for which a start is left although a run has failed.
 constexpr double clear_gain = 0.1;
-// How often all of it begins again at a point that violates less than this share of the least so far.
-constexpr int most_other_starts = 3;
-constexpr double clearly_less = 0.9;
 // Distances within which a bound may have a multiplier: the one of the smallest residual is taken.
 constexpr double distances[] = {1e-9, 1e-6, 1e-4};
 // Curvature is raised to at least this share of the largest.
@@ -183,12 +180,11 @@ Report NloptSolver::optimise(const Ocp& ocp, Iterate& iterate, Clock::time_point
   if (problem_.has_slacks()) problem_.move_to(problem_.with_fitting_slacks());
   Answer answer = assess(problem_.x());
   Status status = improve(ocp, answer, deadline);
-  double least = HUGE_VAL;
+  search_.begin();
   const auto may_be_misled = [&] {
     return status == Status::infeasible || (status == Status::stalled && answer.violation > infeasible_beyond);
   };
-  for (int starts = 0; may_be_misled() && starts < most_other_starts && iterations_left() > 0; ++starts) {
-    if (!find_other_start(ocp, iterate, answer, least, deadline)) break;
+  while (may_be_misled() && iterations_left() > 0 && find_other_start(ocp, iterate, answer, deadline)) {
     fallback_used_ = true;
     status = improve(ocp, answer, deadline);
   }
@@ -203,18 +199,12 @@ Report NloptSolver::optimise(const Ocp& ocp, Iterate& iterate, Clock::time_point
   return report;
 }
 
-/// Where limits seem impossible to meet: looks for a point that violates less than the least of all starts so far, from
-/// the last one and from the guess. Without one that claim is as good as it gets.
-bool NloptSolver::find_other_start(const Ocp& ocp, const Iterate& guess, Answer& answer, double& least,
-                                   Clock::time_point deadline) {
+/// The answer becomes one at another start, if there is one.
+bool NloptSolver::find_other_start(const Ocp& ocp, const Iterate& guess, Answer& answer, Clock::time_point deadline) {
   if (!problem_.has_limits()) return false;
   problem_.move_to(answer.x);
   Iterate other = problem_.iterate();
-  for (const Iterate* from : {&guess, static_cast<const Iterate*>(&other)})
-    least = std::min(least, search_.violation(ocp, *from, scratch_));
-  if (!search_.find(ocp, other, clearly_less * least, deadline, scratch_, other) &&
-      !search_.find(ocp, guess, clearly_less * least, deadline, scratch_, other))
-    return false;
+  if (!search_.find_other(ocp, guess, other, deadline, scratch_, other)) return false;
   if (!problem_.move_to(problem_.read(other))) return false;
   if (problem_.has_slacks()) problem_.move_to(problem_.with_fitting_slacks());
   answer = assess(problem_.x());

@@ -51,8 +51,7 @@ class NloptSolver final : public Solver {
   Status attempt(const Ocp& ocp, Answer& answer, long quota, Clock::time_point deadline);
   Status restore_feasibility(const Ocp& ocp, Answer& answer, Clock::time_point deadline);
   bool find_start(const Ocp& ocp, const Iterate& iterate);
-  bool find_other_start(const Ocp& ocp, const Iterate& guess, Answer& answer, double& least,
-                        Clock::time_point deadline);
+  bool find_other_start(const Ocp& ocp, const Iterate& guess, Answer& answer, Clock::time_point deadline);
   Eigen::VectorXd within_bounds(const Eigen::VectorXd& x) const;
   Answer assess(const Eigen::VectorXd& x);
   /// The Answer at the problem's current iterate with given multipliers.

@@ -33,9 +33,6 @@ constexpr double largest_penalty = 1e10;
 // remove less than the small one count ten times.
 constexpr double short_step = 1e-2, small_share = 1e-2, most_left = 0.9;
 constexpr int most_futile = 50;
-// How often all of it begins again at a point that violates less than this share of the least so far.
-constexpr int most_other_starts = 3;
-constexpr double clearly_less = 0.9;
 // Share of a solution's objective that the remaining defects may account for.
 constexpr double negligible_share = 1e-9;
 constexpr int corrections = 4;
@@ -441,16 +438,6 @@ Status SparseSqp::converge(const Ocp& ocp, Report& report, Clock::time_point dea
   }
 }
 
-/// Where limits seem impossible to meet: looks for a point that violates less than the least of all starts so far, from
-/// the last one and from the guess. Without one that claim is as good as it gets.
-bool SparseSqp::find_other_start(const Ocp& ocp, const Iterate& guess, double& least, Clock::time_point deadline) {
-  if (!rows_.has_limits()) return false;
-  for (const Iterate* from : {&guess, static_cast<const Iterate*>(&current_)})
-    least = std::min(least, search_.violation(ocp, *from, scratch_));
-  return search_.find(ocp, current_, clearly_less * least, deadline, scratch_, current_) ||
-         search_.find(ocp, guess, clearly_less * least, deadline, scratch_, current_);
-}
-
 Report SparseSqp::solve(Iterate& iterate, Clock::time_point deadline) noexcept {
   Report report;
   if (!ocp_ || !is_sound_start(*ocp_, iterate, scratch_)) return report;
@@ -473,9 +460,9 @@ Report SparseSqp::solve(Iterate& iterate, Clock::time_point deadline) noexcept {
     nlp_.read(ocp, iterate, z_.data(), multipliers_.data(), bound_multipliers_.data());
     for (std::size_t k = 0; k < z_.size(); ++k) z_[k] = std::clamp(z_[k], lower_z_[k], upper_z_[k]);
     nlp_.write(ocp, z_.data(), nullptr, nullptr, current_);
-    double least = infinity;
-    for (int starts = 0;; ++starts) {
-      if (starts > 0) {
+    search_.begin();
+    while (true) {
+      if (search_.starts() > 0) {
         nlp_.read(ocp, current_, z_.data(), multipliers_.data(), bound_multipliers_.data());
         qp_.factor().forget_scales();
         penalty_ = 0.0;
@@ -486,7 +473,7 @@ Report SparseSqp::solve(Iterate& iterate, Clock::time_point deadline) noexcept {
       report.status = converge(ocp, report, deadline);
       const bool may_be_misled = report.status == Status::infeasible ||
                                  (report.status == Status::stalled && violation_of(report.kkt) > options_.tolerance);
-      if (!may_be_misled || starts == most_other_starts || !find_other_start(ocp, iterate, least, deadline)) break;
+      if (!may_be_misled || !search_.find_other(ocp, iterate, current_, deadline, scratch_, current_)) break;
     }
   } catch (const std::bad_alloc&) {
     reset();  // the data of the structure may be incomplete

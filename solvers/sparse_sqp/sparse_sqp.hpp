@@ -57,7 +57,6 @@ class SparseSqp final : public Solver {
   bool search(const Ocp& ocp, double residual, double& after);
   void polish(const Ocp& ocp, Report& report, Clock::time_point deadline);
   Status converge(const Ocp& ocp, Report& report, Clock::time_point deadline);
-  bool find_other_start(const Ocp& ocp, const Iterate& guess, double& least, Clock::time_point deadline);
   SparseQp::Outcome find_step(const Ocp& ocp, Report& report, Clock::time_point deadline);
   SparseQp::Outcome find_relaxed_step(Clock::time_point deadline);
   SparseQp::Outcome solve_relaxed(double penalty, Clock::time_point deadline);

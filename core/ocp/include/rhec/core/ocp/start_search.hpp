@@ -20,6 +20,18 @@ class RHEC_EXPORT StartSearch {
  public:
   void setup(const Ocp& ocp);
 
+  /// A solve begins: no other start was tried.
+  void begin() noexcept;
+  /// Counts one more start; false if there have been three.
+  bool take_start() noexcept;
+  int starts() const noexcept { return starts_; }
+
+  /// Where limits seem impossible to meet: `find` from the last point, then from the guess, for a point that violates
+  /// less than nine tenths of the least of all of them so far. It takes a start. Where this is false, that claim is as
+  /// good as it gets.
+  bool find_other(const Ocp& ocp, const Iterate& guess, const Iterate& last, Clock::time_point deadline,
+                  std::span<double> scratch, Iterate& to) noexcept;
+
   /// The sum by which hard limits and bounds are violated by the trajectory that an iterate's controls lead to from its
   /// first state; infinite where that is not finite.
   double violation(const Ocp& ocp, const Iterate& of, std::span<double> scratch) noexcept;
@@ -35,6 +47,8 @@ class RHEC_EXPORT StartSearch {
   void set_scales(const Ocp& ocp) noexcept;
   void move(const Ocp& ocp, const Move& by) noexcept;
 
+  int starts_ = 0;      ///< other ones of this solve
+  double least_ = 0.0;  ///< violation of all of them, and of the guess
   Iterate best_, trial_;
   std::vector<double> limits_;
   std::vector<double> control_scales_, state_scales_;  ///< the first step of each component
