@@ -41,13 +41,14 @@ std::filesystem::path reference_folder() {
 }
 
 void set_blocks(const RheProblem& from, RheProblem& to) noexcept {
+  const bool has_weights = !from.model().description().blocked_noises.empty();  // as an estimator sets them
   std::array<std::uint8_t, longest_horizon> begins;
   for (int j = 0; j < from.structure().lifted_count(); ++j) {
     for (int i = 0; i < from.intervals(); ++i) begins[i] = from.structure().starts_block(i, j);
     to.set_blocks(j, begins.data(), from.structure().is_ramp(j) ? Transition::ramp : Transition::step);
     for (int i = 0; i < from.intervals(); ++i)
       if (begins[i]) to.link(i, j, from.link_variance(i, j));
-    for (int i = 0; i < from.intervals(); ++i) to.set_block_weight(i, j, from.block_weight(i, j));
+    for (int i = 0; has_weights && i < from.intervals(); ++i) to.set_block_weight(i, j, from.block_weight(i, j));
   }
 }
 

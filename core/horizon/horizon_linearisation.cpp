@@ -193,11 +193,14 @@ int HorizonLinearisation::match(const Iterate& iterate, int steps, bool is_exact
 
 /// Whether intervals from `interval` on have the durations and data of the cached ones `steps` later.
 bool HorizonLinearisation::has_same_data(int interval, int steps, int count) const noexcept {
-  const auto first = problem_.at_data(interval), cached = problem_.at_data(interval + steps);
-  return std::equal(problem_.durations_.data() + interval, problem_.durations_.data() + interval + count,
-                    durations_.data() + interval + steps) &&
-         std::equal(problem_.data_.data() + first, problem_.data_.data() + first + problem_.at_data(count),
-                    data_.data() + cached);
+  const auto same = [](const double* now, const double* cached, std::ptrdiff_t entries) {
+    for (std::ptrdiff_t k = 0; k < entries; ++k)
+      if (now[k] != cached[k]) return false;
+    return true;
+  };
+  return same(problem_.durations_.data() + interval, durations_.data() + interval + steps, count) &&
+         same(problem_.data_.data() + problem_.at_data(interval), data_.data() + problem_.at_data(interval + steps),
+              problem_.at_data(count));
 }
 
 bool HorizonLinearisation::is_known(int interval, int steps, int count, bool is_exact) const noexcept {

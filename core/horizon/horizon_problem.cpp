@@ -37,7 +37,8 @@ HorizonProblem::HorizonProblem(std::shared_ptr<const Model> model, const Setup& 
   if (substeps_ < 1) throw Error("substeps: expected at least 1 integration step per interval");
   const auto nodes = static_cast<std::size_t>(structure_.capacity().intervals) + 1;
   durations_.assign(nodes, 0.0);
-  data_.assign(nodes * model_->data_count(), 0.0);
+  data_count_ = model_->data_count();
+  data_.assign(nodes * data_count_, 0.0);
   lower_.assign(nodes * stride(), -infinity);
   upper_.assign(nodes * stride(), infinity);
   const int row = IntervalDynamics::row_length(structure_);
@@ -231,7 +232,7 @@ void HorizonProblem::simulate_new_interval(int interval, Iterate& iterate, std::
   }
   dynamics.gather_rows(iterate, {interval, interval}, simulated_.z.data());
   // With a ramp, derivatives are with respect to both its ends, which a linearisation cannot reuse; data may change.
-  const bool is_reusable = !structure_.any_ramp() && model_->data_count() == 0;
+  const bool is_reusable = !structure_.any_ramp() && data_count_ == 0;
   simulated_.duration = is_reusable ? durations_[interval] : 0.0;
   model_->integrate_rows({.count = 1,
                           .z = simulated_.z.data(),

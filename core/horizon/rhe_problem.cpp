@@ -111,6 +111,7 @@ double RheProblem::link_variance(int interval, int parameter) const noexcept {
 }
 
 void RheProblem::set_block_weight(int interval, int parameter, double weight) noexcept {
+  has_block_weights_ |= weight != 0.0;
   block_weights_[interval * np() + parameter] = weight;
 }
 
@@ -153,7 +154,7 @@ void RheProblem::set_blocks(int parameter, const std::uint8_t* begins, Transitio
   const bool ramp = transition == Transition::ramp && !is_one_block;
   HorizonStructure& structure = changing_structure();
   structure.set_ramp(parameter, ramp);
-  for (int i = 0; i < intervals(); ++i) block_weights_[i * np() + parameter] = 0.0;
+  for (int i = 0; has_block_weights_ && i < intervals(); ++i) block_weights_[i * np() + parameter] = 0.0;
   if (is_one_block) return;  // no interval has ever been marked
   // Node 0 holds the first block's value, so the first interval has no block control unless a ramp starts there.
   for (int i = 0; i < intervals(); ++i) structure.set_block_start(i, parameter, begins[i] && (i > 0 || ramp));
@@ -215,17 +216,15 @@ void RheProblem::take_data(const RheProblem& from) noexcept {
   for (std::size_t i = 0; i < between_.size(); ++i) between_[i].assign(from.between_[i]);
   measured_inputs_ = from.measured_inputs_;
   link_information_ = from.link_information_;
+  has_block_weights_ = from.has_block_weights_;
   block_weights_ = from.block_weights_;
   bounded_intervals_ = from.bounded_intervals_;
   has_block_bounds_ = from.has_block_bounds_;
 }
 
 void RheProblem::drop_first_interval() noexcept {
-  const auto data_count = static_cast<std::size_t>(model().data_count());
-  for (int i = 0; i + 1 < intervals(); ++i) {
-    set_duration(i, duration(i + 1));
-    std::copy_n(interval_data(i + 1), data_count, interval_data(i));
-  }
+  for (int i = 0; i + 1 < intervals(); ++i) set_duration(i, duration(i + 1));
+  std::copy(interval_data(1), interval_data(std::max(intervals(), 1)), interval_data(0));
   if (setup_.most_between > 0 && intervals() > 0)
     std::rotate(between_.begin(), between_.begin() + 1, between_.begin() + intervals());
   for (AlignedDoubles* rows : {&outputs_, &weights_, &node_weights_})
@@ -331,7 +330,8 @@ double RheProblem::write_cost(StageRange range, const Iterate& iterate, Hessian 
         for (int c = 0; c < n; ++c, H += stride(), information += n)
           for (int r = 0; r < n; ++r) H[r] += 2.0 * information[r];
       });
-      for (int j = 0; j < np(); ++j) qp.H(0)[(nx() + j) * (stride() + 1)] += 2.0 * first_block_weight(j);
+      for (int j = 0; has_block_weights_ && j < np(); ++j)
+        qp.H(0)[(nx() + j) * (stride() + 1)] += 2.0 * first_block_weight(j);
     }
   }
   if (structure().any_start())
@@ -340,7 +340,8 @@ double RheProblem::write_cost(StageRange range, const Iterate& iterate, Hessian 
         const double* of_interval = values.data() + static_cast<std::ptrdiff_t>(i) * np();
         return std::any_of(of_interval, of_interval + np(), [](double value) { return value != 0.0; });
       };
-      if (control_count(i) == nu() || !(has_any(link_information_) || has_any(block_weights_))) continue;
+      if (control_count(i) == nu() || !(has_any(link_information_) || (has_block_weights_ && has_any(block_weights_))))
+        continue;
       if (known && matrices) known->is_clean()[i] = 0;
       total += links(i, iterate, matrices ? qp.H(i) : nullptr, vectors ? qp.h(i) : nullptr);
     }
@@ -358,7 +359,7 @@ double RheProblem::arrival_term(const Iterate& iterate, double* q) const noexcep
     total += pull * (iterate.state(0)[c] - arrival_mean[c]);
     if (q) q[c] += 2.0 * pull;
   }
-  for (int j = 0; j < np(); ++j) {
+  for (int j = 0; has_block_weights_ && j < np(); ++j) {
     const double value = iterate.state(0)[nx() + j], pull = first_block_weight(j) * value;
     total += pull * value;
     if (q) q[nx() + j] += 2.0 * pull;

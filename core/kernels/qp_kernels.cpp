@@ -91,6 +91,10 @@ KktParts kkt_of_states(const QpView& view) {
     constexpr int used = (known_states + 2 + lane_count - 1) / lane_count;
     if (known_states > 6 && view.stride == 16 && view.controls == 2)
       return kkt_of<used, known_states, known_states - most_carried, 16>(view);
+    // Process noise of one to four states beside them.
+    constexpr int used_with_noise = (known_states + 6 + lane_count - 1) / lane_count;
+    if (known_states <= 6 && view.stride == 16 && view.controls <= 6)
+      return kkt_of<used_with_noise, known_states, known_states - most_carried, 16>(view);
     if (view.stride == lane_count) return kkt_of<1, known_states, known_states - most_carried>(view);
     if (view.stride == 2 * lane_count) return kkt_of<2, known_states, known_states - most_carried>(view);
   }

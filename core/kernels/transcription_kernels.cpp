@@ -197,24 +197,25 @@ struct OneEight {
   static constexpr bool is_known = true;
   static int of(int /*size*/) { return 8; }
   static int count(int outputs) { return known_outputs > 0 ? known_outputs : outputs; }
+  static int read(int outputs) { return (count(outputs) + lane_count - 1) / lane_count * lane_count; }
 };
 struct AnyEights {
   static constexpr bool is_known = false;
   static int of(int size) { return padded(size); }
   static int count(int outputs) { return outputs; }
+  static int read(int outputs) { return padded(outputs); }
 };
 
 /// The measurements at one node of the range; `seen` are the measured outputs. Returns the sum of squares.
 template <bool matrices, bool vectors, class Width>
 RHEC_ALWAYS_INLINE inline Lanes write_node(const MeasurementView& measured, long node, const double* seen,
-                                           const double* predicted, const double* J, int stride, int used,
-                                           bool is_clean, double* H, double* h) {
-  const double* const output_weights = measured.output_weights + node * measured.output_weights_step;
+                                           const double* output_weights, const double* predicted, const double* J,
+                                           int stride, int used, bool is_clean, double* H, double* h) {
   const int count = Width::count(measured.output_count), outputs = Width::of(count),
             states = Width::of(measured.vehicle_states);
   double *weights = measured.room, *pulls = measured.pulls ? measured.pulls + node * outputs : weights + outputs;
   Lanes total{};
-  for (int k = 0; k < outputs; k += lane_count) {
+  for (int k = 0; k < Width::read(count); k += lane_count) {
     const Lanes y = load(seen + k), weight = y == y ? 2.0 * load(output_weights + k) : Lanes{};
     if (matrices) store(weight, weights + k);
     if (!vectors) continue;
@@ -276,7 +277,8 @@ double write_nodes(const CostView& view, const MeasurementView& measured, int fi
   const int count = Width::count(measured.output_count);
   const long outputs = Width::of(count), J_size = static_cast<long>(count) * Width::of(measured.vehicle_states);
   const double *y = measured.outputs + first * outputs, *predicted = measured.predicted, *J = measured.jacobians;
-  const double *z = measured.values + first * stride, *inputs = measured.inputs + first * stride;
+  const double *output_weights = measured.output_weights, *z = measured.values + first * stride,
+               *inputs = measured.inputs + first * stride;
   const int first_input = view.states, end_of_inputs = view.states + measured.input_count;
   double *H = view.H + first * wide * stride, *h = view.h + first * stride;
   Lanes total{};
@@ -284,8 +286,8 @@ double write_nodes(const CostView& view, const MeasurementView& measured, int fi
     const bool has_inputs = i < view.intervals;
     const int used = view.states + (has_inputs ? view.control_counts[i] : 0);
     const bool is_clean = measured.is_clean && measured.is_clean[i] != 0;
-    total +=
-        write_node<matrices, vectors, Width>(measured, i - first, y, predicted, J, view.stride, used, is_clean, H, h);
+    total += write_node<matrices, vectors, Width>(measured, i - first, y, output_weights, predicted, J, view.stride,
+                                                  used, is_clean, H, h);
     if (vectors && has_inputs) {
       for (int k = first_input / lane_count * lane_count; k < end_of_inputs; k += lane_count) {
         const Lanes seen = load(inputs + k), weight = seen == seen ? 2.0 * load(measured.input_weights + k) : Lanes{};
@@ -299,6 +301,7 @@ double write_nodes(const CostView& view, const MeasurementView& measured, int fi
       H[k * stride + k] = measured.pulls ? H[k * stride + k] + curvature : curvature;
     }
     y += outputs;
+    output_weights += measured.output_weights_step;
     predicted += outputs;
     J += J_size;
     z += stride;

@@ -43,6 +43,11 @@ struct Columns {
   double share;                             ///< of a w: half with one at the end
 };
 
+/// A number that is known, so that no library is called for it.
+void clear_eight(double* row) {
+  for (int k = 0; k < 8; ++k) row[k] = 0.0;
+}
+
 }  // namespace
 
 StateNoiseModel::StateNoiseModel(std::shared_ptr<const Model> vehicle, std::vector<int> states,
@@ -96,13 +101,10 @@ void StateNoiseModel::integrate_rows(const IntervalRows& request) const noexcept
                       .ends = nx + 2 * np + nw + nu + ni,
                       .share = request.ramp ? 0.5 : 1.0};
   const bool in_place = is_in_place(request.ramp);
+  const std::ptrdiff_t first_eight = padded(static_cast<int>(noise.inputs));
   // Where a column of the vehicle's [x; p; u; p_end] is in [x; p; w; u; xi; p_end; w_end]: never before its own place.
   const auto place = [&](std::ptrdiff_t c) { return c < nx + np ? c : c < nx + np + nu ? c + nw : c + nw + ni; };
   const auto spread = [&](double* row) {
-    if (in_place) {  // a few numbers, for which a call of a library takes longer
-      for (std::ptrdiff_t c = noise.inputs; c < width; ++c) row[c] = 0.0;
-      return;
-    }
     for (std::ptrdiff_t c = narrow; c-- > nx + np;) row[place(c)] = row[c];
     std::fill_n(row + noise.parameters, nw, 0.0);
     std::fill_n(row + noise.inputs, ni, 0.0);
@@ -132,7 +134,16 @@ void StateNoiseModel::integrate_rows(const IntervalRows& request) const noexcept
     if (request.jacobians) {
       double* const J = request.jacobians + i * request.jacobian_step;
       const std::ptrdiff_t row = request.jacobian_row;
-      for (std::ptrdiff_t r = 0; r < nx; ++r) spread(J + r * row);
+      if (in_place) {
+        double* of_state = J;
+        for (std::ptrdiff_t r = 0; r < nx; ++r, of_state += row) {
+          for (std::ptrdiff_t c = noise.inputs; c < first_eight; ++c) of_state[c] = 0.0;
+          if (first_eight < width) clear_eight(of_state + first_eight);
+          for (std::ptrdiff_t c = first_eight + 8; c < width; c += 8) clear_eight(of_state + c);
+        }
+      } else {
+        for (std::ptrdiff_t r = 0; r < nx; ++r) spread(J + r * row);
+      }
       for (std::ptrdiff_t k = 0; k < ni; ++k) J[states_[k] * row + noise.inputs + k] = root;
       for (std::ptrdiff_t k = 0; k < nw; ++k) {
         J[blocked_[k] * row + noise.parameters + k] = part;

@@ -135,9 +135,7 @@ class RHEC_EXPORT HorizonProblem : public Ocp {
   const double* at(const AlignedDoubles& rows, int i) const noexcept {
     return rows.data() + static_cast<std::ptrdiff_t>(i) * structure_.stride();
   }
-  std::ptrdiff_t at_data(int interval) const noexcept {
-    return static_cast<std::ptrdiff_t>(interval) * model_->data_count();
-  }
+  std::ptrdiff_t at_data(int interval) const noexcept { return interval * data_count_; }
   bool keeps_curvature() const noexcept;
   /// Bounds, the initial step, and limits.
   void write_bounds(const Iterate& iterate, StageRange range, StageQp& qp, std::span<double> scratch) const noexcept;
@@ -157,6 +155,7 @@ class RHEC_EXPORT HorizonProblem : public Ocp {
   int substeps_;
   HorizonTerms terms_;
   AlignedDoubles lower_, upper_;
+  std::ptrdiff_t data_count_;  ///< of an interval
   std::vector<double> durations_, data_;
   /// The interval that `simulate_new_interval` has simulated, with its derivatives.
   struct SimulatedInterval {

@@ -191,7 +191,7 @@ class RHEC_EXPORT RheProblem final : public HorizonProblem {
   std::vector<double> between_points_;                         ///< shares of an interval (PointSums)
   AlignedDoubles outputs_;                                     ///< one row per node, NaN where nothing was measured
   AlignedDoubles output_weights_, output_periods_, output_inverse_periods_;  ///< rows; the period of angles, else 0
-  bool has_weights_ = false;               ///< some measurement at a node has weights of its own
+  bool has_weights_ = false, has_block_weights_ = false;  ///< some measurement at a node, or block, has one of its own
   AlignedDoubles weights_, node_weights_;  ///< one row per node: these, and their products with `output_weights_`
   AlignedDoubles measured_inputs_, input_weights_;  ///< rows as in Iterate; NaN and 0 outside of the inputs
   std::vector<double> link_information_, block_weights_;
