@@ -29,6 +29,8 @@ constexpr double impossible = 3.0;
 constexpr double probable = 0.9;
 // Slip that has jumped within an interval displaces the vehicle by at least this share of it on the next one again.
 constexpr double goes_on_by = 0.8;
+// Slip that has changed within the gates has done so by this many samples ago.
+constexpr int changed_before[] = {3, 6};
 // A hypothesis that has explained so many samples in a row has learnt how the vehicle moves.
 constexpr int informed = 4;
 // A search that has not explained anything for so long begins anew.
@@ -194,6 +196,34 @@ bool SensorWatch::may_follow() const noexcept {
   return true;
 }
 
+/// Slip that changes by less than what fails a gate at once turns the heading all the same, until a position is off by
+/// what new slip alone does not explain. What has been measured since is then used anew, from before that. False if
+/// this does not explain what is disputed either.
+bool SensorWatch::consider_slip_before() noexcept {
+  if (disputed_samples_ != 1 || !is_position_disputed()) return false;
+  // After a gap there is little to be used anew.
+  if (std::ranges::any_of(records_, [](const Record& each) { return each.after_gap; })) return false;
+  const std::vector<Memory::Entry>& entries = memory_->entries;
+  for (const int back : changed_before) {
+    if (back >= memory_->connected) return false;
+    const auto entry = [&](int ago) -> const Memory::Entry& {
+      return entries[(memory_->newest + entries.size() - static_cast<std::size_t>(ago)) % entries.size()];
+    };
+    WalkingFilter& filter = slip_->filter;
+    filter.mean() = entry(back).mean;
+    filter.covariance() = entry(back).covariance;
+    make_slip_anew(filter, setup_.parameter_sigmas);
+    for (int ago = back; ago > 0; --ago) {
+      filter.predict(entry(ago).inputs.data(), entry(ago - 1).time - entry(ago).time);
+      filter.update(entry(ago - 1).outputs.measured());
+    }
+    filter.predict(input_.data(), memory_->duration);
+    memory_->has_slip_changed_before = is_within_bounds(filter) && fits(filter, raw_.data());
+    if (memory_->has_slip_changed_before) return true;
+  }
+  return false;
+}
+
 /// The log likelihood of slip that has jumped just now; NaN if it has not.
 double SensorWatch::consider_slip() noexcept {
   const bool is_new = !slip_->is_active;
@@ -202,11 +232,14 @@ double SensorWatch::consider_slip() noexcept {
   if (is_new) {
     start(*slip_);
     held_count_ = 0;
-    if (disputed_nis(slip_->filter) > left_unexplained * disputed_nis(own_->filter)) {
+    memory_->has_slip_changed_before = false;
+    const bool explains = disputed_nis(slip_->filter) <= left_unexplained * disputed_nis(own_->filter) &&
+                          fits(slip_->filter, raw_.data());
+    if (!explains && !consider_slip_before()) {
       refute(*slip_);
       return new_likelihood;
     }
-    if (disputed_samples_ <= fresh) new_likelihood = likelihood(slip_->filter, true);
+    if (disputed_samples_ <= fresh && explains) new_likelihood = likelihood(slip_->filter, true);
   } else if (!fits(slip_->filter, raw_.data()) && goes_on()) {
     go_on_from(edge_->filter, slip_->filter);
     copy_numbers(slip_->filter.mean(), memory_->before_slip);
@@ -263,8 +296,9 @@ SensorWatch::Finding SensorWatch::settle(double time, const double* outputs) noe
     Finding finding = accept(*slip_);
     for (Record& record : records_) record = {};
     acquit(outputs);
-    finding.release = true;
-    finding.rebase = false;
+    // What the estimator has made of the samples before is wrong, too, where slip had changed before.
+    finding.rebase = memory_->has_slip_changed_before;
+    finding.release = !finding.rebase;
     return finding;
   }
   if (slip_->is_active) hold_back(time, outputs);

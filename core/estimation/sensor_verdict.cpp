@@ -81,10 +81,16 @@ void SensorWatch::widen(Estimate& estimate) noexcept {
   for (Eigen::Index j = 0; j < nx; ++j)
     if (model.description().states[static_cast<std::size_t>(j)].is_angle)
       away[j] = angle_difference(mean[j], estimate.state[j]);
+  const bool is_of_position = std::ranges::any_of(memory_->first_errors, [](double each) { return !std::isnan(each); });
+  // Who goes along with what a compass says of slip for a sample does not leave its place.
+  const double share = memory_->was_open && !is_of_position ? slip_probability_ : 0.0;
+  const double spread = slip_probability_ - share * share;
   for (Eigen::Index c = 0; c < n; ++c)
     for (Eigen::Index r = 0; r < n; ++r)
       estimate.covariance(r, c) +=
-          slip_probability_ * (covariance(r, c) + away[r] * away[c] - estimate.covariance(r, c));
+          slip_probability_ * (covariance(r, c) - estimate.covariance(r, c)) + spread * away[r] * away[c];
+  estimate.state += share * away.head(nx);
+  estimate.parameters += share * away.tail(n - nx);
 }
 
 /// What volume is usual is learnt where nothing is missing.

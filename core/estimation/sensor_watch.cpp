@@ -129,6 +129,7 @@ SensorWatch::SensorWatch(std::shared_ptr<const Model> model, const Setup& setup)
     entry.mean = memory_->before_mean;
     entry.covariance = memory_->before_covariance;
     entry.inputs.assign(model->input_count(), 0.0);
+    entry.outputs = MeasuredOutputs(model->output_count());
   }
   raw_.assign(model->output_count(), Memory::unknown);
   memory_->first_errors = raw_;
@@ -164,11 +165,12 @@ void SensorWatch::reset() noexcept {
   input_findings_ = 0;
   calm_samples_ = setup_.calm;
   held_count_ = innovation_count_ = 0;
-  memory_->count = 0;
+  memory_->count = memory_->connected = 0;
   memory_->has_advanced = false;
   memory_->offsets->reset();
   memory_->stuck.reset();
   memory_->beyond_bounds = 0.0;
+  memory_->impossible_samples = 0;
   memory_->was_open = false;
   memory_->undisputed_samples = setup_.calm;
   std::fill(believed_input_.begin(), believed_input_.end(), 0.0);
@@ -181,7 +183,7 @@ void SensorWatch::restart(const Eigen::VectorXd& mean, const Eigen::MatrixXd& co
   is_blind_ = false;
   if (memory_->search) memory_->search->cancel();
   end_dispute();
-  memory_->count = 0;
+  memory_->count = memory_->connected = 0;
   memory_->has_advanced = false;
   memory_->offsets->forget_onsets();
 }
@@ -276,7 +278,7 @@ SensorWatch::Finding SensorWatch::judge(double time, double* outputs, const doub
     filter.expect();
     find_stuck(outputs);
     std::copy_n(outputs, raw_.size(), raw_.data());
-    bool is_disputed = false, is_any_measured = false, is_placed = false;
+    bool is_disputed = false, is_any_measured = false, is_placed = false, is_back = true;
     for (std::size_t s = 0; s < sensors_.size(); ++s) {
       const bool has_room = innovation_count_ < static_cast<int>(innovations_.size());
       Innovation& innovation = has_room ? innovations_[innovation_count_] : scratch_;
@@ -294,6 +296,7 @@ SensorWatch::Finding SensorWatch::judge(double time, double* outputs, const doub
         continue;
       }
       is_disputed = true;
+      is_back = is_back && records_[s].after_gap && records_[s].failures == 1;
       findings_[s] |= reason::rejected;
       ++states_[s].rejected;
       for (const int j : sensors_[s].outputs) outputs[j] = Memory::unknown;
@@ -301,6 +304,7 @@ SensorWatch::Finding SensorWatch::judge(double time, double* outputs, const doub
     if (is_blind_) test_inputs(raw_.data());
     unplaced_samples_ = is_placed ? 0 : unplaced_samples_ + is_disputed;
     if (is_disputed) {
+      if (is_disputed_ && is_back) end_dispute();
       finding = settle(time, outputs);
     } else if (is_disputed_ && std::ranges::any_of(records_, [](const Record& each) { return each.failures > 0; })) {
       // What is disputed was not measured.
@@ -326,7 +330,28 @@ SensorWatch::Finding SensorWatch::judge(double time, double* outputs, const doub
       double& beyond = memory_->beyond_bounds;
       beyond += Memory::slip_beyond(filter, memory_->before_update, setup_.noise) - usually_beyond;
       beyond = std::min(std::max(beyond, 0.0), 2.0 * impossibly_beyond);
-      if (beyond > impossibly_beyond) input_findings_ |= reason::implausible;
+      if (beyond > impossibly_beyond) {
+        input_findings_ |= reason::implausible;
+        if (!is_disputed && memory_->offsets->has_recent()) {
+          // What seemed to be off was right, and slip was not.
+          memory_->offsets->withdraw_recent(filter);
+          end_dispute();
+          beyond = 0.0;
+          finding.rebase = true;
+        }
+      }
+      memory_->impossible_samples = beyond > impossibly_beyond ? memory_->impossible_samples + is_placed : 0;
+      if (memory_->search && !is_disputed && memory_->impossible_samples > Memory::hopeless * setup_.proof) {
+        // Of a vehicle that heads elsewhere measurements ask for slip that cannot be, again and again.
+        memory_->impossible_samples = 0;
+        beyond = 0.0;
+        for (std::size_t j = 0; j < setup_.parameter_sigmas.size(); ++j)
+          filter.restart_parameter(static_cast<int>(j), setup_.parameter_sigmas[j]);
+        search_from(filter, *memory_->search);
+        memory_->offsets->forget_onsets();
+        end_dispute();
+        finding.rebase = true;
+      }
       memory_->offsets->take(filter, std::max(1.0, *std::ranges::max_element(excesses_)));
       if (!is_disputed && memory_->offsets->has_suspect()) {
         memory_->offsets->adopt_suspected(filter);
@@ -338,9 +363,10 @@ SensorWatch::Finding SensorWatch::judge(double time, double* outputs, const doub
     if (is_blind_ || is_unobserved_) finding = {.release = false, .rebase = true};
     is_unobserved_ = false;
     if (finding.rebase) start_search(outputs);
+    if (finding.rebase) memory_->connected = 0;
     if (finding.release) std::copy(raw_.begin(), raw_.end(), outputs);
     note_corrected(finding.rebase || finding.release);
-    remember(time);
+    remember(time, outputs);
   }
   note_offsets();
   if (is_blind_) input_findings_ |= reason::rejected;
@@ -368,6 +394,9 @@ SensorWatch::Finding SensorWatch::judge(double time, double* outputs, const doub
 /// when it moves must agree better with no error than with the one that it has had.
 bool SensorWatch::admits(std::size_t sensor, const Innovation& innovation) noexcept {
   Record& record = records_[sensor];
+  // What it was before a gap, as while it was stuck, says nothing of it afterwards.
+  const bool comes_back = innovation.time - heard_[sensor] > longest_gap;
+  if (comes_back) record = {};
   const bool is_suspect = record.failures >= suspect_after;
   const auto degrees = static_cast<double>(innovation.value.size());
   const bool is_kept_out = record.failures > 0 && !record.after_gap && !sees_position(sensors_[sensor].outputs);
@@ -383,7 +412,7 @@ bool SensorWatch::admits(std::size_t sensor, const Innovation& innovation) noexc
     } else {
       record.error += (innovation.value - record.error) / error_memory;
     }
-    if (record.failures == 0) record.after_gap = innovation.time - heard_[sensor] > longest_gap;
+    if (record.failures == 0) record.after_gap = comes_back;
     ++record.failures;
     record.passes = 0;
     return false;
@@ -493,14 +522,17 @@ void SensorWatch::note_corrected(bool has_jumped) noexcept {
   }
 }
 
-void SensorWatch::remember(double time) noexcept {
+/// `outputs`: that were used.
+void SensorWatch::remember(double time, const double* outputs) noexcept {
   Memory& memory = *memory_;
   memory.newest = static_cast<std::size_t>(memory.count % static_cast<std::int64_t>(memory.entries.size()));
   ++memory.count;
+  ++memory.connected;
   Memory::Entry& entry = memory.entries[memory.newest];
   entry.time = time;
   copy_numbers(own_->filter.mean(), entry.mean);
   copy_numbers(own_->filter.covariance(), entry.covariance);
+  entry.outputs.assign(weighed(outputs));
 }
 
 }  // namespace rhec

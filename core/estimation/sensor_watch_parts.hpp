@@ -45,11 +45,13 @@ struct SensorWatch::Memory {
     double time = unknown;
     Eigen::VectorXd mean;
     Eigen::MatrixXd covariance;
-    std::vector<double> inputs;
+    std::vector<double> inputs;  ///< until the next one
+    MeasuredOutputs outputs;     ///< that were used
   };
   std::vector<Entry> entries{remembered_samples};
   std::size_t newest = 0;
   std::int64_t count = 0;
+  std::int64_t connected = 0;  ///< of the newest, by what moves and by what is measured
   // Before the last advance, and that.
   Eigen::VectorXd before_mean;
   Eigen::MatrixXd before_covariance;
@@ -58,7 +60,8 @@ struct SensorWatch::Memory {
   bool was_calm = true;        ///< health was ok when the dispute began, and there had been none for some time
   bool was_open = false;       ///< what was disputed at the last sample was probably slip, and nothing was said of it
   int undisputed_samples = 0;  ///< in a row
-  bool is_slip_possible = false;  ///< slip that explains what is disputed is within its bounds
+  bool has_slip_changed_before = false;  ///< slip that explains what is disputed has changed some samples ago
+  bool is_slip_possible = false;         ///< slip that explains what is disputed is within its bounds
   StuckValues stuck;
   std::unique_ptr<OffsetWatch> offsets;
   std::unique_ptr<WalkingFilter> trial;   ///< for what is tried within one call
@@ -73,6 +76,7 @@ struct SensorWatch::Memory {
   Eigen::VectorXd before_slip;       ///< that of slip that may have jumped
   /// By how much measurements ask for slip beyond its bounds: a cumulative sum of standard deviations (Page 1954).
   double beyond_bounds = 0.0;
+  int impossible_samples = 0;  ///< in a row in which that sum was too large
 
   /// After an update of a filter from a mean: how far slip would be beyond its bounds, in its standard deviations.
   static double slip_beyond(const WalkingFilter& filter, const Eigen::VectorXd& before,

@@ -181,7 +181,8 @@ class Result:
 
     def surprises(self):
         """What is not reached, and not known to be so."""
-        return [line for line in self.missed() if line not in self.data.get("known", [])]
+        known = {line for lines in self.data.get("known", {}).values() for line in lines}
+        return [line for line in self.missed() if line not in known]
 
     def missed(self):
         lines = [f"{kind}: not reached: {text}" for kind in self.kinds for text, reached in self.wanted(kind).items() if not reached]

@@ -156,7 +156,7 @@ class RHEC_EXPORT SensorWatch {
   double consider_slip() noexcept;
   void consider_moved(double likelihood_of_new_slip) noexcept;
   void begin_edge(bool is_new) noexcept;
-  bool goes_on() noexcept, may_follow() const noexcept;
+  bool goes_on() noexcept, may_follow() const noexcept, consider_slip_before() noexcept;
   void hold_back(double time, const double* outputs) noexcept;
   void acquit(const double*outputs) noexcept, end_dispute() noexcept;
   bool sees_position(int output) const noexcept;
@@ -166,7 +166,7 @@ class RHEC_EXPORT SensorWatch {
   void test_inputs(const double* outputs) noexcept;
   void note_offsets() noexcept;
   void note_corrected(bool has_jumped) noexcept;
-  void remember(double time) noexcept;
+  void remember(double time, const double* outputs) noexcept;
   void note_volume(const Estimate& estimate) noexcept;
   double limit(std::size_t sensor, Eigen::Index degrees) const noexcept;
 
