@@ -69,6 +69,8 @@ class OffsetWatch {
   bool has_any() const noexcept;
   /// Whether estimates are to be refined: there is one, or one is not improbable.
   bool is_in_doubt() const noexcept { return candidate_ >= 0 || has_any(); }
+  /// Whether one that has not said enough yet is more probable than not.
+  bool is_probable() const noexcept { return candidate_ >= 0 && probability_ > 0.5; }
   bool has_recent() const noexcept;  ///< one that was adopted of late
   /// Gives an estimate of [x; p] the mean and the covariance that it has if offsets are not known better than they are.
   /// One that is not adopted yet, and the other one of two outputs of which one is off, count with their probability:
