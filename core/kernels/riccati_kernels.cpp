@@ -106,9 +106,6 @@ inline double bound_of(const RiccatiView& view, int i, int k) {
   return (view.sides[at] < 0 ? view.lower : view.upper)[at];
 }
 
-/// Of a stage: more are eliminated as other controls are.
-constexpr int most_additive = 8;
-
 /// Pointers to the rows of a stage.
 template <class Stage>
 struct Memory {
@@ -141,20 +138,19 @@ struct Memory {
   RHEC_ALWAYS_INLINE R row(const double* rows, int r) const { return R::from(rows + r * stride); }
 };
 
-/// Rows of H + [A B]'P[A B], with a P in rows of `P_stride`. The rows of the controls come first, since the elimination
-/// depends on them.
+/// Rows of H + [A B]'P[A B]. The rows of the controls come first, since the elimination depends on them.
 template <class Stage>
 RHEC_ALWAYS_INLINE inline void form_rows(const RiccatiView& view, int i, const Stage& stage, const Memory<Stage>& at,
-                                         const double* P, long P_stride, typename Stage::R* X) {
+                                         typename Stage::R* X) {
   using R = typename Stage::R;
   R W[Stage::most_states];  // rows of P [A B]
   stage.each_next_state([&](auto j) RHEC_ALWAYS_INLINE {
     // For moved states P is read from its lower triangle only, and for the carried ones beside them from its upper
     // triangle, so that it stays symmetric.
-    R sums[2] = {R::from(P + j * P_stride).between(stage.moved, stage.next_states), R{}};
+    R sums[2] = {at.row(at.P_next, j).between(stage.moved, stage.next_states), R{}};
     stage.each_moved([&](auto l) RHEC_ALWAYS_INLINE {
       const bool is_above = l < j || j >= stage.moved;
-      sums[l % R::chains].add(at.row(at.AB, l), is_above ? P[l * P_stride + j] : P[j * P_stride + l]);
+      sums[l % R::chains].add(at.row(at.AB, l), is_above ? at.P_next[l * at.stride + j] : at.P_next[j * at.stride + l]);
     });
     W[j] = sums[0];
     if (R::chains > 1) W[j].add(sums[1]);
@@ -297,107 +293,13 @@ RHEC_ALWAYS_INLINE inline void reflect_pair(const RiccatiView& view, const Memor
   *view.is_reflected = true;
 }
 
-/// The part of a row that holds states.
 template <class Stage>
-using StateRow = Row<Stage::state_registers>;
-
-/// A control of a stage that adds to one next state alone.
-struct Additive {
-  int control, column;  ///< its number, and its entry in rows [s; w]
-  int state;            ///< what it adds to
-  double size, own;     ///< its entries in B, and on the diagonal of H
-  double inverse;       ///< 1 / pivot, once it is eliminated
-  double* PB;
-
-  template <class Stage>
-  Additive(const RiccatiView& view, int i, const Stage& stage, const Memory<Stage>& at, int number)
-      : control(stage.columns - stage.offset + number),
-        column(stage.columns + number),
-        state(view.added_to[static_cast<long>(i) * view.controls + control]),
-        size(at.AB[state * at.stride + column]),
-        own(at.H[column * at.stride + column]),
-        inverse(at.inverse[control]),
-        PB(view.PB + (static_cast<long>(i) * view.controls + control) * at.stride) {
-    if (view.diagonal) own += view.diagonal[i * at.stride + column];
-  }
-};
-
-/// Eliminates additive controls, which follow those of the stage's shape, from the next value function, the last one
-/// first: `reduced` gets its P without them, in rows of as many entries as the shape has. U gets what it gets of other
-/// controls. False if a control has no minimiser.
-template <class Stage>
-RHEC_ALWAYS_INLINE inline bool eliminate_additive(const RiccatiView& view, int i, const Stage& stage,
-                                                  const Memory<Stage>& at, double tolerance, double* reduced) {
-  using R = typename Stage::R;
-  constexpr int width = Stage::most_columns;
-  R P[Stage::most_states];
-  stage.each_next_state([&](auto l) RHEC_ALWAYS_INLINE { P[l] = at.row(at.P_next, l); });
-  const double* now = at.P_next;
-  long now_stride = at.stride;
-  int number = view.additive[i] - 1;
-  do {
-    const Additive added(view, i, stage, at, number);
-    R push{};  // P times the control's column
-    push.add(R::from(now + added.state * now_stride), added.size);
-    double *const PB = added.PB, *const U = at.U + added.control * at.stride;
-    push.to(PB);
-    const double pivot = added.own + added.size * added.size * now[added.state * now_stride + added.state];
-    const double whole = added.own + added.size * added.size * at.P_next[added.state * at.stride + added.state];
-    if (!(pivot > tolerance * whole && pivot > 0.0)) return false;
-    const double inverse = 1.0 / pivot;
-    at.inverse[added.control] = inverse;
-    R scaled{};
-    scaled.add(push, -inverse);
-    stage.each_next_state([&](auto l) RHEC_ALWAYS_INLINE {
-      P[l].add(push, scaled.splat(l));
-      P[l].to(reduced + l * width);
-    });
-    now = reduced;
-    now_stride = width;
-    // Its coupling to the state and to the controls before it.
-    R sums[2] = {push.between(stage.moved, stage.next_states), R{}};
-    stage.each_moved([&](auto l) RHEC_ALWAYS_INLINE { sums[l % R::chains].add(at.row(at.AB, l), push.splat(l)); });
-    if (R::chains > 1) sums[0].add(sums[1]);
-    sums[0].first(stage.columns).to(U);
-    for (int before = 0; before < number; ++before) {
-      const Additive other(view, i, stage, at, before);
-      U[other.column] = PB[other.state] * other.size;
-    }
-  } while (--number >= 0);
-  return true;
-}
-
-/// Policies of the additive controls in terms of the state, from those of the others.
-template <class Stage>
-RHEC_ALWAYS_INLINE inline void write_additive_policies(const RiccatiView& view, int i, const Stage& stage,
-                                                       const Memory<Stage>& at, const typename Stage::R* policies) {
-  using R = typename Stage::R;
-  const int first = stage.columns - stage.offset, end = first + view.additive[i];
-  for (int c = first; c < end; ++c) {
-    const double* const U = at.U + c * at.stride;
-    R policy = R::from(U).first(stage.states);
-    stage.each_control([&](auto k) RHEC_ALWAYS_INLINE { policy.add(policies[k], -U[k]); });
-    for (int before = first; before < c; ++before)
-      policy.add(R::from(at.V + before * at.stride), -U[stage.offset + before]);
-    R scaled{};
-    scaled.add(policy, at.inverse[c]);
-    scaled.to(at.V + c * at.stride);
-  }
-}
-
-template <class Stage, bool has_additive = false>
 RHEC_ALWAYS_INLINE inline bool factor_stage(const RiccatiView& view, int i, double tolerance) {
   using R = typename Stage::R;
   const Stage stage(view, i);
   const Memory<Stage> at(view, i);
   R X[Stage::most_columns];
-  if constexpr (has_additive) {
-    alignas(64) double reduced[Stage::most_states * Stage::most_columns];
-    if (!eliminate_additive(view, i, stage, at, tolerance, reduced)) return false;
-    form_rows(view, i, stage, at, reduced, Stage::most_columns, X);
-  } else {
-    form_rows(view, i, stage, at, at.P_next, at.stride, X);
-  }
+  form_rows(view, i, stage, at, X);
   bool any_fixed = false;
   stage.each_control([&](auto k) RHEC_ALWAYS_INLINE { any_fixed |= at.sides[k] != 0; });
   view.fixes[i] = any_fixed;
@@ -417,8 +319,6 @@ RHEC_ALWAYS_INLINE inline bool factor_stage(const RiccatiView& view, int i, doub
     drift.to(at.drift);
   }
   if constexpr (Stage::is_compact) close_loop(stage, at, X, view.for_steps);
-  if constexpr (has_additive)
-    if (view.for_steps) write_additive_policies(view, i, stage, at, X);
   return true;
 }
 
@@ -644,7 +544,7 @@ RHEC_ALWAYS_INLINE inline void solve_controls(const RiccatiView& view, int i, co
 
 /// Replaces p of the next node by p of this one. It stays in registers, since a value just written to memory takes a
 /// while to be readable.
-template <class Stage, bool has_additive = false>
+template <class Stage>
 RHEC_ALWAYS_INLINE inline void solve_stage_backward(const RiccatiView& view, int i, typename Stage::R& p) {
   using R = typename Stage::R;
   const Stage stage(view, i);
@@ -654,16 +554,6 @@ RHEC_ALWAYS_INLINE inline void solve_stage_backward(const RiccatiView& view, int
   };
   R costate = p;
   costate.add(R::from(at.drift));
-  [[maybe_unused]] double of_additive[has_additive ? most_additive : 1];  // gradients by additive controls
-  if constexpr (has_additive) {
-    double* const now = at.p;  // only for its entries
-    for (int number = view.additive[i] - 1; number >= 0; --number) {
-      const Additive added(view, i, stage, at, number);
-      costate.to(now);
-      of_additive[number] = at.h[added.column] + added.size * now[added.state];
-      costate.add(R::from(added.PB), -added.inverse * of_additive[number]);
-    }
-  }
   R gradient;  // with respect to the state (closed-loop in the first case) and the controls
   if (Stage::is_compact && !view.fixes[i]) {
     const R h = R::from(at.h);
@@ -689,15 +579,6 @@ RHEC_ALWAYS_INLINE inline void solve_stage_backward(const RiccatiView& view, int
   }
   p.to(at.p);
   solve_controls(view, i, stage, at, [&](auto k) RHEC_ALWAYS_INLINE { return gradient.entry(k); });
-  if constexpr (has_additive)
-    for (int number = 0; number < view.additive[i]; ++number) {
-      const int c = stage.columns - stage.offset + number;
-      const double* const U = at.U + c * at.stride;
-      double sum = of_additive[number];
-      stage.each_control([&](auto k) RHEC_ALWAYS_INLINE { sum += U[k] * at.p[k]; });
-      for (int k = stage.columns; k < stage.columns + number; ++k) sum += U[k] * at.p[k];
-      at.p[stage.columns + number] = -at.inverse[c] * sum;
-    }
 }
 
 /// What solve_stage_backward does, for any sizes, with p in memory.
@@ -743,7 +624,7 @@ inline void write_multipliers(const RiccatiView& view, int i, const Stage& stage
 }
 
 /// Replaces the step s of the state by that of the next node.
-template <class Stage, bool has_additive = false>
+template <class Stage>
 RHEC_ALWAYS_INLINE inline void solve_stage_forward(const RiccatiView& view, int i, double* s) {
   using R = typename Stage::R;
   const Stage stage(view, i);
@@ -766,12 +647,6 @@ RHEC_ALWAYS_INLINE inline void solve_stage_forward(const RiccatiView& view, int 
     stage.each_control([&](auto k) RHEC_ALWAYS_INLINE { sum += AB[k] * w[k]; });
     reached[l] = next[l] = sum;
   });
-  if constexpr (has_additive)
-    for (int number = 0; number < view.additive[i]; ++number) {
-      const Additive added(view, i, stage, at, number);
-      z[added.column] = at.p[added.column] - dot(at.V + added.control * at.stride);
-      next[added.state] = reached[added.state] += added.size * z[added.column];
-    }
   double* const costates = view.costates + (i + 1) * at.stride;
   if constexpr (Stage::is_known) {
     R sums[2] = {R::from(at.p_next).first(stage.next_states), R{}};
@@ -790,7 +665,7 @@ RHEC_ALWAYS_INLINE inline void solve_stage_forward(const RiccatiView& view, int 
 
 /// The same in one register: [next state; control] is a sum of columns. Carried states are kept in a register of their
 /// own, so that they add no latency.
-template <class Stage, bool has_additive = false>
+template <class Stage>
 RHEC_ALWAYS_INLINE inline void solve_stage_forward(const RiccatiView& view, int i, Row<1>& carried, Row<1>& s) {
   const Stage stage(view, i);
   const Memory<Stage> at(view, i);
@@ -803,14 +678,6 @@ RHEC_ALWAYS_INLINE inline void solve_stage_forward(const RiccatiView& view, int 
   store(is_state ? s.part[0] : next.part[0], z);
   const Row<1> reached = next;
   stage.each_control([&](auto k) RHEC_ALWAYS_INLINE { next.part[0] += load(at.T + k * 8) * reached.splat(k); });
-  if constexpr (has_additive)
-    for (int number = 0; number < view.additive[i]; ++number) {
-      const Additive added(view, i, stage, at, number);
-      const double value = at.p[added.column] - sum_of(load(at.V + added.control * at.stride) * s.part[0]);
-      z[added.column] = value;
-      const LaneMask is_it = lane_numbers == static_cast<long long>(added.state);
-      next.part[0] += is_it ? all(added.size * value) : Lanes{};
-    }
   s.part[0] = is_state ? next.part[0] : Lanes{};
   carried.part[0] += load(at.b);
   store(s.part[0], z + at.stride);
@@ -973,24 +840,6 @@ inline auto with_shape(const RiccatiView& view, int i, const Function& function)
   return function.template operator()<Shape<16, 0, 0>>();
 }
 
-/// Calls `function` with the type of the shape that a full stage has without its additive controls, which has two
-/// others. False if it is not one of the compiled ones.
-template <bool is_written_out, class Function>
-inline bool with_shape_of_pair(const RiccatiView& view, int i, const Function& function) {
-  const int states = view.states, carried = view.identity_counts[i];
-  if (view.state_counts[i] != states || view.state_counts[i + 1] != states) return false;
-  if (view.stride == 8 && states == 5 && carried == 2)
-    return function.template operator()<Shape<1, 5, 2, true, 2, 8>>(), true;
-  if (view.stride != 16) return false;
-  if (states == 5 && carried == 2) return function.template operator()<Shape<1, 5, 2, true, 2, 16>>(), true;
-  if (states == 6 && carried == 2) return function.template operator()<Shape<1, 6, 2, true, 2, 16>>(), true;
-  if (states == 7 && carried == 2) return function.template operator()<Shape<2, 7, 2, is_written_out, 2, 16>>(), true;
-  if (states == 7 && carried == 3) return function.template operator()<Shape<2, 7, 2, is_written_out, 3, 16>>(), true;
-  if (states == 8 && carried == 3) return function.template operator()<Shape<2, 8, 2, is_written_out, 3, 16>>(), true;
-  if (states == 8 && carried == 4) return function.template operator()<Shape<2, 8, 2, is_written_out, 4, 16>>(), true;
-  return false;
-}
-
 // Whole matrices of long rows fit only into the widest registers; unrolled for others, they are spilled to memory.
 constexpr bool matrices_fit = lane_count == 8;
 
@@ -1001,71 +850,16 @@ inline bool is_alike(const RiccatiView& view, int i, int j) {
          view.state_counts[j + 1] == view.state_counts[i + 1];
 }
 
-/// The same, of stages that a factorisation has looked at.
-inline bool is_factored_alike(const RiccatiView& view, int i, int j) {
-  return is_alike(view, i, j) && (!view.additive || view.additive[j] == view.additive[i]);
-}
-
-/// The number of a stage's controls behind its first two, if each of them is free, coupled to nothing in H, and adds to
-/// one next state alone; otherwise 0.
-inline int find_additive(const RiccatiView& view, int i) {
-  const int states = view.states, controls = view.control_counts[i], found = controls - 2;
-  if (found <= 0 || found > most_additive || view.own_H) return 0;
-  const long stride = view.stride, row = static_cast<long>(i) * stride;
-  std::uint64_t any_side = 0;
-  for (long k = 0; k < stride; k += 8) {
-    std::uint64_t eight;
-    __builtin_memcpy(&eight, view.sides + row + k, sizeof eight);
-    any_side |= eight;
-  }
-  if (any_side != 0) return 0;
-  const double* const AB = view.AB + row * states;
-  const double* const H = view.H + row * (states + view.controls);
-  const int moved = view.state_counts[i + 1] - view.identity_counts[i];
-  int* const added_to = view.added_to + static_cast<long>(i) * view.controls;
-  // Mostly what the next stage's control of this number adds to.
-  const int* const likely = i + 1 < view.intervals ? added_to + view.controls : added_to;
-  for (int c = controls - 1; c >= 2; --c) {
-    const int column = states + c;
-    double effects = 0.0;
-    for (int l = 0; l < moved; ++l) effects += __builtin_fabs(AB[l * stride + column]);
-    int state = likely[c] < moved ? likely[c] : 0;
-    while (state < moved && __builtin_fabs(AB[state * stride + column]) != effects) ++state;
-    for (int l = 0; state == moved && l < moved; ++l)
-      if (__builtin_fabs(AB[l * stride + column]) == effects) state = l;
-    if (state == moved || effects == 0.0) return 0;
-    Lanes sum{};
-    for (long j = 0; j < stride; j += lane_count) sum += absolute(load(H + column * stride + j));
-    if (sum_of(sum) != H[column * (stride + 1)]) return 0;  // nothing is added to it in a row of zeros
-    added_to[c] = state;
-  }
-  return found;
-}
-
 int factor(const RiccatiView& view, int first, double tolerance) {
-  const auto look_at = [&](int i) {
-    if (view.additive) view.additive[i] = static_cast<std::uint8_t>(find_additive(view, i));
-    return !view.additive || view.additive[i] == 0;
-  };
   for (int i = first; i >= 0;) {
     if (view.special[i]) return i;
-    const int alike = i;
-    bool done = true;
-    if (!look_at(i)) {
-      const bool is_compiled = with_shape_of_pair<matrices_fit>(view, i, [&]<class Stage>() {
-        do done = factor_stage<Stage, true>(view, i, tolerance);
-        while (done && --i >= 0 && is_alike(view, alike, i) && !look_at(i));
-      });
-      if (!done) return i;
-      if (is_compiled) continue;
-      view.additive[i] = 0;
-    }
-    done = with_shape<matrices_fit>(view, i, [&]<class Stage>() {
+    const bool done = with_shape<matrices_fit>(view, i, [&]<class Stage>() {
       if constexpr (!Stage::is_known && Stage::most_columns > 8)
         return factor_general(view, i, tolerance) && (--i, true);
+      const int alike = i;
       do
         if (!factor_stage<Stage>(view, i, tolerance)) return false;
-      while (--i >= 0 && is_alike(view, alike, i) && look_at(i));
+      while (--i >= 0 && is_alike(view, alike, i));
       return true;
     });
     if (!done) return i;
@@ -1076,21 +870,15 @@ int factor(const RiccatiView& view, int first, double tolerance) {
 int solve_backward(const RiccatiView& view, int first) {
   for (int i = first; i >= 0;) {
     if (view.special[i]) return i;
-    const int alike = i;
-    const auto solve = [&]<class Stage, bool has_additive>() RHEC_ALWAYS_INLINE {
-      auto p = Stage::R::from(view.p + static_cast<long>(i + 1) * view.stride);
-      do solve_stage_backward<Stage, has_additive>(view, i, p);
-      while (--i >= 0 && is_factored_alike(view, alike, i));
-    };
-    if (view.additive && view.additive[i] != 0) {
-      with_shape_of_pair<true>(view, i, [&]<class Stage>() { solve.template operator()<Stage, true>(); });
-      continue;
-    }
     with_shape<true>(view, i, [&]<class Stage>() {
-      if constexpr (!Stage::is_known && Stage::most_columns > 8)
+      if constexpr (!Stage::is_known && Stage::most_columns > 8) {
         solve_backward_general(view, i--);
-      else
-        solve.template operator()<Stage, false>();
+        return;
+      }
+      const int alike = i;
+      auto p = Stage::R::from(view.p + static_cast<long>(i + 1) * view.stride);
+      do solve_stage_backward<Stage>(view, i, p);
+      while (--i >= 0 && is_alike(view, alike, i));
     });
   }
   return -1;
@@ -1099,24 +887,20 @@ int solve_backward(const RiccatiView& view, int first) {
 int solve_forward(const RiccatiView& view, int first) {
   for (int i = first; i < view.intervals;) {
     if (view.special[i]) return i;
-    const int alike = i;
-    const auto solve = [&]<class Stage, bool has_additive>() RHEC_ALWAYS_INLINE {
+    with_shape<true, false>(view, i, [&]<class Stage>() {
+      const int alike = i;
       const double* first_state = view.values + static_cast<long>(i) * view.stride;
       if constexpr (Stage::is_compact) {
         Row<1> s = Row<1>::from(first_state), carried = s;
-        do solve_stage_forward<Stage, has_additive>(view, i, carried, s);
-        while (++i < view.intervals && is_factored_alike(view, alike, i));
+        do solve_stage_forward<Stage>(view, i, carried, s);
+        while (++i < view.intervals && is_alike(view, alike, i));
       } else {
         double s[Stage::most_states];
         for (int j = 0; j < view.state_counts[i]; ++j) s[j] = first_state[j];
-        do solve_stage_forward<Stage, has_additive>(view, i, s);
-        while (++i < view.intervals && is_factored_alike(view, alike, i));
+        do solve_stage_forward<Stage>(view, i, s);
+        while (++i < view.intervals && is_alike(view, alike, i));
       }
-    };
-    if (view.additive && view.additive[i] != 0)
-      with_shape_of_pair<true>(view, i, [&]<class Stage>() { solve.template operator()<Stage, true>(); });
-    else
-      with_shape<true, false>(view, i, [&]<class Stage>() { solve.template operator()<Stage, false>(); });
+    });
   }
   return view.intervals;
 }
@@ -1218,6 +1002,10 @@ void combine_batches(const double* const* batches, const double* const* weights,
   if (number == 1) combine_few<1>(batches, weights, sums, count);
 }
 
+/// The part of a row that holds states.
+template <class Stage>
+using StateRow = Row<Stage::state_registers>;
+
 /// Replaces Sigma of stage i by that of the next node: A Sigma A' + B cov(w | s) B', with A the closed-loop dynamics.
 template <class Stage>
 RHEC_ALWAYS_INLINE inline void carry_stage(const RiccatiView& view, int i, StateRow<Stage>* rows) {
@@ -1286,30 +1074,6 @@ RHEC_ALWAYS_INLINE inline void carry_stage(const RiccatiView& view, int i, State
   stage.each_moved([&](auto l) RHEC_ALWAYS_INLINE { next[l] = combine_by(l, columns, next[l]); });
   stage.each_carried([&](auto l) RHEC_ALWAYS_INLINE { next[l] = columns[l]; });
   stage.each_next_state([&](auto l) RHEC_ALWAYS_INLINE { rows[l] = next[l].first(stage.next_states); });
-}
-
-/// What additive controls do to the Sigma that the others leave: each adds -inverse times (PB's step plus noise).
-template <class Stage>
-RHEC_ALWAYS_INLINE inline void carry_additive(const RiccatiView& view, int i, StateRow<Stage>* rows) {
-  using S = StateRow<Stage>;
-  const Stage stage(view, i);
-  const Memory<Stage> at(view, i);
-  for (int number = 0; number < view.additive[i]; ++number) {
-    const Additive added(view, i, stage, at, number);
-    const double* const PB = added.PB;
-    const double gain = added.size * added.inverse;  // of the state, by PB's step
-    S product{};                                     // Sigma PB
-    stage.each_next_state([&](auto l) RHEC_ALWAYS_INLINE { product.add(rows[l], PB[l]); });
-    double variance = 0.0;
-    stage.each_next_state([&](auto l) RHEC_ALWAYS_INLINE { variance += product.entry(l) * PB[l]; });
-    // In pairs, so that Sigma stays symmetric.
-    S change = S{}.with(added.state, 0.5 * (gain * gain * variance + 2.0 * added.size * gain));
-    change.add(product, -gain);
-    stage.each_next_state([&](auto l) RHEC_ALWAYS_INLINE {
-      rows[l].add(change, l == added.state ? 1.0 : 0.0);
-      rows[l] = rows[l].with(added.state, rows[l].entry(added.state) + change.entry(l));
-    });
-  }
 }
 
 /// Row r of `to`: the sum over k of factor(r, k) times row k of `from`, which has `width` entries. Two rows at a time,
@@ -1381,25 +1145,18 @@ inline void carry_general(const RiccatiView& view, int i, double* sigma) {
 int carry_covariance(const RiccatiView& view, int first, double* covariance, double* all) {
   for (int i = first; i < view.intervals;) {
     if (view.special[i]) return i;
-    const int alike = i, states = view.state_counts[i], next_states = view.state_counts[i + 1];
-    const auto carry = [&]<class Stage, bool has_additive>() RHEC_ALWAYS_INLINE {
-      StateRow<Stage> rows[Stage::most_states];
-      for (int j = 0; j < states; ++j) rows[j] = StateRow<Stage>::from(covariance + j * view.stride);
-      do {
-        carry_stage<Stage>(view, i, rows);
-        if constexpr (has_additive) carry_additive<Stage>(view, i, rows);
-      } while (++i < view.intervals && !all && next_states == states && is_factored_alike(view, alike, i));
-      for (int l = 0; l < next_states; ++l) rows[l].to(covariance + l * view.stride);
-    };
-    if (view.additive && view.additive[i] != 0)
-      with_shape_of_pair<matrices_fit>(view, i, [&]<class Stage>() { carry.template operator()<Stage, true>(); });
-    else
-      with_shape<matrices_fit>(view, i, [&]<class Stage>() {
-        if constexpr (Stage::is_known)
-          carry.template operator()<Stage, false>();
-        else
-          carry_general(view, i++, covariance);
-      });
+    with_shape<matrices_fit>(view, i, [&]<class Stage>() {
+      if constexpr (Stage::is_known) {
+        const int alike = i, states = view.state_counts[i], next_states = view.state_counts[i + 1];
+        StateRow<Stage> rows[Stage::most_states];
+        for (int j = 0; j < states; ++j) rows[j] = StateRow<Stage>::from(covariance + j * view.stride);
+        do carry_stage<Stage>(view, i, rows);
+        while (++i < view.intervals && !all && next_states == states && is_alike(view, alike, i));
+        for (int l = 0; l < next_states; ++l) rows[l].to(covariance + l * view.stride);
+      } else {
+        carry_general(view, i++, covariance);
+      }
+    });
     if (!all) continue;
     double* block = all + static_cast<long>(i) * view.states * view.states;
     for (int c = 0; c < view.states; ++c)
@@ -1533,8 +1290,7 @@ void form(const RiccatiView& view, int i, double* out) {
     if constexpr (Stage::is_known) {
       typename Stage::R X[Stage::most_columns]{};
       const Stage stage(view, i);
-      const Memory<Stage> at(view, i);
-      form_rows(view, i, stage, at, at.P_next, at.stride, X);
+      form_rows(view, i, stage, Memory<Stage>(view, i), X);
       for (int k = 0; k < stage.columns; ++k) X[k].to(out + static_cast<long>(k) * view.stride);
     } else {
       form_general(view, i, out);

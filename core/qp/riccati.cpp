@@ -57,11 +57,6 @@ Riccati::Riccati(const Capacity& capacity)
   for (auto* v : {&U_, &V_}) v->assign(stages * nw_ * row, 0.0);
   for (auto* v : {&closed_, &columns_}) v->assign(stages * 64, 0.0);
   inverse_.assign(stages * nw_, 0.0);
-  if (nw_ > 2) {
-    additive_.assign(stages, 0);
-    added_to_.assign(stages * nw_, 0);
-    PB_.assign(stages * nw_ * row, 0.0);
-  }
   for (auto* v : {&drift_, &g_, &p_}) v->assign(stages * row, 0.0);
   state_counts_.assign(stages, 0);
   control_counts_.assign(stages, 0);
@@ -119,9 +114,6 @@ RiccatiView Riccati::view_of(const StageQp& qp, const std::int8_t* sides) noexce
           .closed = closed_.data(),
           .T = columns_.data(),
           .inverse = inverse_.data(),
-          .additive = additive_.empty() ? nullptr : additive_.data(),
-          .added_to = added_to_.data(),
-          .PB = PB_.data(),
           .fixes = fixes_control_.data(),
           .drift = drift_.data(),
           .g = g_.data(),

@@ -18,9 +18,8 @@ using testing::RandomQp;
 
 /// What the recursion stores for a QP.
 struct Recursion {
-  AlignedDoubles P, U, V, closed, T, inverse, drift, g, p, PB;
-  std::vector<std::uint8_t> fixes, special, additive;
-  std::vector<int> added_to;
+  AlignedDoubles P, U, V, closed, T, inverse, drift, g, p;
+  std::vector<std::uint8_t> fixes, special;
   Iterate step;
   RiccatiView view;
 
@@ -28,12 +27,11 @@ struct Recursion {
     const Capacity& capacity = qp.capacity();
     const std::size_t stages = capacity.intervals + 1, row = qp.stride();
     P.assign(stages * capacity.states * row, 0.0);
-    for (auto* v : {&U, &V, &PB}) v->assign(stages * capacity.controls * row, 0.0);
+    for (auto* v : {&U, &V}) v->assign(stages * capacity.controls * row, 0.0);
     for (auto* v : {&closed, &T}) v->assign(stages * 64, 0.0);
     inverse.assign(stages * capacity.controls, 0.0);
     for (auto* v : {&drift, &g, &p}) v->assign(stages * row, 0.0);
-    added_to.assign(stages * capacity.controls, 0);
-    for (auto* v : {&fixes, &special, &additive}) v->assign(stages, 0);
+    for (auto* v : {&fixes, &special}) v->assign(stages, 0);
     view.intervals = qp.intervals();
     view.states = capacity.states;
     view.controls = capacity.controls;
@@ -56,9 +54,6 @@ struct Recursion {
     view.T = T.data();
     view.inverse = inverse.data();
     view.fixes = fixes.data();
-    view.additive = additive.data();
-    view.added_to = added_to.data();
-    view.PB = PB.data();
     view.drift = drift.data();
     view.g = g.data();
     view.p = p.data();
@@ -126,132 +121,6 @@ TEST(RiccatiKernels, OfTheRecursionAgreeWithTheDenseSystem) {
       }
     }
   }
-}
-
-/// Makes the controls behind the first two, in most stages, such as process noise is: each with a cost of its own alone
-/// and one entry in B, some beside each other in the same row. Its variance may be next to nothing, or large.
-void make_additive(RandomQp& random, StageQp& qp) {
-  const int states = qp.states(0), stride = qp.stride();
-  for (int i = 0; i < qp.intervals(); ++i) {
-    if (random.integer(0, 5) == 0) continue;
-    const int moved = qp.states(i + 1) - qp.identity_counts()[i];
-    for (int k = states + 2; k < states + qp.controls(i); ++k) {
-      for (int l = 0; l < moved; ++l) qp.AB(i)[l * stride + k] = 0.0;
-      qp.AB(i)[random.integer(0, moved - 1) * stride + k] = random.uniform(0.2, 1.0) * (random.integer(0, 1) * 2 - 1);
-      for (int j = 0; j < states + qp.controls(i); ++j) qp.H(i)[k * stride + j] = qp.H(i)[j * stride + k] = 0.0;
-      qp.H(i)[k * (stride + 1)] = std::pow(10.0, random.uniform(-3.0, 5.0));
-    }
-  }
-}
-
-TEST(RiccatiKernels, EliminateControlsThatAddToOneStateAsTheyDoOthers) {
-  RandomQp random(21);
-  int eliminated = 0, at_once = 0;
-  for (int trial = 0; trial < 800; ++trial) {
-    const int states = random.integer(5, 8), controls = random.integer(3, 6);
-    StageQp qp = random.make(random.integer(1, 7), states, controls, true);
-    if (trial % 8 > 0) random.carry(qp);
-    make_additive(random, qp);
-    const ActiveSet active = trial % 2 == 0 ? ActiveSet(qp.capacity()) : some_active_controls(random, qp);
-    const int N = qp.intervals(), stride = qp.stride();
-    const DenseQp dense(qp, active);
-    const Eigen::VectorXd z = dense.solve();
-    AlignedDoubles diagonal(static_cast<std::size_t>(N + 1) * stride, 0.0);
-    for (int k = 0; trial % 3 == 0 && k < (N + 1) * stride; ++k) diagonal[k] = random.uniform(0.0, 2.0);
-    for (const KernelSet& set : runnable_kernels()) {
-      Recursion one(qp, active), other(qp, active);
-      other.view.additive = nullptr;
-      if (trial % 3 == 0) one.view.diagonal = other.view.diagonal = diagonal.data();
-      one.solve(*set.riccati);
-      other.solve(*set.riccati);
-      const auto near = [&](const AlignedDoubles& a, const AlignedDoubles& b, std::ptrdiff_t at, const char* what) {
-        ASSERT_NEAR(a[at], b[at], 1e-9 * (1.0 + std::abs(b[at])))
-            << set.instruction_set << ", " << what << ", " << at << " of rows of " << stride;
-      };
-      for (int i = 0; i < N; ++i) {
-        const int m = qp.controls(i), used = states + m;
-        if (one.additive[i] != 0) {
-          ASSERT_EQ(one.additive[i], m - 2);
-          ++eliminated;
-          at_once += m - 2 > 1;
-        }
-        for (int r = 0; r < states; ++r)
-          for (int c = 0; c < states; ++c) near(one.P, other.P, (i * states + r) * stride + c, "P");
-        for (int c = 0; c < m; ++c) {
-          const std::ptrdiff_t row = (static_cast<std::ptrdiff_t>(i) * controls + c) * stride;
-          near(one.inverse, other.inverse, static_cast<std::ptrdiff_t>(i) * controls + c, "inverse");
-          for (int k = 0; k < states; ++k) near(one.V, other.V, row + k, "V");
-          for (int k = 0; k < states; ++k) near(one.U, other.U, row + k, "U");
-          for (int k = 0; k < c; ++k) near(one.U, other.U, row + states + k, "U");
-        }
-        for (int k = 0; k < used; ++k) near(one.p, other.p, static_cast<std::ptrdiff_t>(i) * stride + k, "p");
-      }
-      for (int i = 0; i <= N; ++i) {
-        const double size = 1.0 + z.cwiseAbs().maxCoeff();
-        for (int k = 0; k < states + (i < N ? qp.controls(i) : 0); ++k)
-          ASSERT_NEAR(one.step.row(i)[k], other.step.row(i)[k], 1e-9 * size) << set.instruction_set << ", " << i;
-        for (int j = 0; i > 0 && j < states; ++j)
-          ASSERT_NEAR(one.step.costate(i)[j], other.step.costate(i)[j], 1e-8 * size) << set.instruction_set;
-        for (int j = 0; trial % 3 > 0 && j < states; ++j)
-          ASSERT_NEAR(one.step.state(i)[j], z[dense.state_at[i] + j], 1e-8 * size) << set.instruction_set;
-        for (int j = 0; trial % 3 > 0 && i < N && j < qp.controls(i); ++j)
-          ASSERT_NEAR(one.step.control(i)[j], z[dense.control_at[i] + j], 1e-8 * size) << set.instruction_set;
-        // To the last digits of the numbers that are added, next states are what the dynamics make of the step.
-        for (int l = 0; i < N && l < states; ++l) {
-          double reached = qp.b(i)[l], largest = std::abs(reached);
-          const auto add = [&](int k) {
-            const double part = qp.AB(i)[l * stride + k] * one.step.row(i)[k];
-            reached += part;
-            largest = std::max(largest, std::abs(part));
-          };
-          for (int k = 0; k < states + qp.controls(i); ++k) add(k);
-          ASSERT_NEAR(one.step.state(i + 1)[l], reached, 1e-14 * largest) << set.instruction_set << ", " << i;
-        }
-      }
-    }
-  }
-  const int sets = static_cast<int>(runnable_kernels().size());
-  EXPECT_GT(eliminated, 150 * sets);
-  EXPECT_GT(at_once, 75 * sets);
-}
-
-TEST(RiccatiKernels, CarryTheCovarianceThroughControlsThatAddToOneState) {
-  RandomQp random(22);
-  int eliminated = 0;
-  for (int trial = 0; trial < 200; ++trial) {
-    const int states = random.integer(5, 8), controls = random.integer(3, 6);
-    StageQp qp = random.make(random.integer(1, 7), states, controls, false);
-    random.carry(qp);
-    make_additive(random, qp);
-    const int stride = qp.stride(), N = qp.intervals();
-    const ActiveSet none(qp.capacity());
-    Eigen::MatrixXd root(states, states);
-    for (double& entry : root.reshaped()) entry = random.uniform(-1.0, 1.0);
-    const Eigen::MatrixXd first = root * root.transpose();
-    for (const KernelSet& set : runnable_kernels()) {
-      AlignedDoubles covariances[2], all[2];
-      for (const bool is_plain : {false, true}) {
-        Recursion recursion(qp, none);
-        recursion.view.for_steps = trial % 2 == 0;
-        if (is_plain) recursion.view.additive = nullptr;
-        ASSERT_EQ(set.riccati->factor(recursion.view, N - 1, 1e-11), -1);
-        for (int i = 0; i < N; ++i) eliminated += recursion.additive[i] != 0;
-        AlignedDoubles& now = covariances[is_plain];
-        now.assign(static_cast<std::size_t>(states) * stride, 0.0);
-        for (int r = 0; r < states; ++r)
-          for (int c = 0; c < states; ++c) now[r * stride + c] = first(r, c);
-        all[is_plain].assign(static_cast<std::size_t>(N + 1) * states * states, 0.0);
-        double* const every = trial % 3 == 0 ? all[is_plain].data() : nullptr;
-        ASSERT_EQ(set.riccati->carry_covariance(recursion.view, 0, now.data(), every), N);
-      }
-      for (std::size_t k = 0; k < covariances[0].size(); ++k)
-        ASSERT_NEAR(covariances[0][k], covariances[1][k], 1e-10 * (1.0 + std::abs(covariances[1][k])))
-            << set.instruction_set << ", " << states << " states, " << controls << " controls";
-      for (std::size_t k = 0; k < all[0].size(); ++k)
-        ASSERT_NEAR(all[0][k], all[1][k], 1e-10 * (1.0 + std::abs(all[1][k]))) << set.instruction_set;
-    }
-  }
-  EXPECT_GT(eliminated, 75 * static_cast<int>(runnable_kernels().size()));
 }
 
 /// A symmetric matrix with its eigenvalues' absolute values, by Eigen.

@@ -33,14 +33,7 @@ struct RiccatiView {
   /// 8 x 8 per stage, if a row fits into one register: rows [A - B V, B] of the next states that are not identity rows;
   /// and the columns that map s to [next s; w].
   double *closed = nullptr, *T = nullptr;
-  double* inverse = nullptr;  ///< n_w per stage: 1 / pivot, 0 if a control is fixed
-  /// Of stages with two controls and others that are free, coupled to nothing in H, and add to one next state each (as
-  /// process noise does), `factor` may eliminate the latter from the next value function. Per stage their number; n_w
-  /// per stage: the states that they add to; n_w rows per stage: P times their columns of B, with P as it is when one
-  /// is eliminated. Null: all controls are treated alike.
-  std::uint8_t* additive = nullptr;
-  int* added_to = nullptr;
-  double* PB = nullptr;
+  double* inverse = nullptr;      ///< n_w per stage: 1 / pivot, 0 if a control is fixed
   std::uint8_t* fixes = nullptr;  ///< per stage: whether any of its controls is fixed
   double* drift = nullptr;        ///< one row per stage: P_{i+1} b_i
   double* g = nullptr;  ///< one row per stage: gradient with respect to z before elimination, if a control is fixed

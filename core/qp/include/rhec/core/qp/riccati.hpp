@@ -185,11 +185,11 @@ class RHEC_EXPORT Riccati {
   bool convexified_ = false, for_steps_ = true;
   bool has_initial_inverse_ = false;  ///< of P at node 0; otherwise node 0 was factorised as a special stage
   const RiccatiKernels* kernels_ = nullptr;
-  AlignedDoubles P_, U_, V_, closed_, columns_, inverse_, drift_, g_, p_, PB_;  // see RiccatiView
+  AlignedDoubles P_, U_, V_, closed_, columns_, inverse_, drift_, g_, p_;  // see RiccatiView
   AlignedDoubles initial_inverse_;
-  std::vector<int> state_counts_, control_counts_, added_to_;
-  std::vector<std::uint8_t> is_special_, fixes_control_, has_gradient_, additive_;  // N stages
-  std::vector<Reduction> reductions_;                                               // N stages, then node 0
+  std::vector<int> state_counts_, control_counts_;
+  std::vector<std::uint8_t> is_special_, fixes_control_, has_gradient_;  // N stages
+  std::vector<Reduction> reductions_;                                    // N stages, then node 0
   std::vector<double> G_, L_, factor_;  // of special stages: full G and L; Cholesky factor of the reduced G
   std::vector<double> K_, T_, Y_;       // v = -K s - k, w = T v + Y s + y0
   std::vector<double> C_, eliminator_;  // rows at each node; row operations of the elimination at each stage
