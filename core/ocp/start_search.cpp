@@ -82,7 +82,7 @@ double StartSearch::violation_of_trial(const Ocp& ocp, std::span<double> scratch
   if (!limits_.empty()) ocp.evaluate_limits(trial_, limits_.data(), scratch);
   double sum = 0.0, worst = -1.0;
   for (int i = 0; i <= ocp.intervals(); ++i) {
-    double here = 0.0;
+    double here = 0.0;  // not finite where a value is not: hence the zeros that are multiplied
     for (int j = 0; j < ocp.state_count(i); ++j) {
       const double value = trial_.state(i)[j];
       here += std::max({0.0 * value, ocp.state_lower(i)[j] - value, value - ocp.state_upper(i)[j]});
