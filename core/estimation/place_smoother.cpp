@@ -62,7 +62,7 @@ PlaceSmoother::PlaceSmoother(const std::shared_ptr<const Model>& model, const Pr
        {&covariance_, &next_covariance_, &filtered_covariance_, &predicted_, &transition_, &across_, &gain_, &scaled_})
     M->setZero(n_, n_);
   jacobian_.setZero(n_, n_ + inputs_);
-  factor_ = Eigen::LLT<Eigen::MatrixXd>(n_);
+  factor_.compute(Eigen::MatrixXd::Identity(n_, n_));  // which has room then
 }
 
 void PlaceSmoother::reset() noexcept {

@@ -45,7 +45,7 @@ RheProblem make_process_problem(std::shared_ptr<const ProcessModel> model, RhePr
 
 InformationOf::InformationOf(Eigen::Index n)
     : sigmas_(Eigen::VectorXd::Zero(n)), scaled_(Eigen::MatrixXd::Zero(n, n)), inverse_(scaled_) {
-  factor_ = Eigen::LLT<Eigen::MatrixXd>(n);
+  factor_.compute(Eigen::MatrixXd::Identity(n, n));  // which has room then
 }
 
 void InformationOf::find(const Eigen::MatrixXd& covariance, Eigen::MatrixXd& information) noexcept {

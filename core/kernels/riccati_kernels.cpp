@@ -138,12 +138,10 @@ struct Memory {
   RHEC_ALWAYS_INLINE R row(const double* rows, int r) const { return R::from(rows + r * stride); }
 };
 
-/// Rows of H + [A B]'P[A B]. The rows of the controls come first, since the elimination depends on them.
+/// Rows of P [A B].
 template <class Stage>
-RHEC_ALWAYS_INLINE inline void form_rows(const RiccatiView& view, int i, const Stage& stage, const Memory<Stage>& at,
-                                         typename Stage::R* X) {
+RHEC_ALWAYS_INLINE inline void multiply_rows(const Stage& stage, const Memory<Stage>& at, typename Stage::R* W) {
   using R = typename Stage::R;
-  R W[Stage::most_states];  // rows of P [A B]
   stage.each_next_state([&](auto j) RHEC_ALWAYS_INLINE {
     // For moved states P is read from its lower triangle only, and for the carried ones beside them from its upper
     // triangle, so that it stays symmetric.
@@ -155,6 +153,13 @@ RHEC_ALWAYS_INLINE inline void form_rows(const RiccatiView& view, int i, const S
     W[j] = sums[0];
     if (R::chains > 1) W[j].add(sums[1]);
   });
+}
+
+/// Rows of H + [A B]'W. The rows of the controls come first, since the elimination depends on them.
+template <class Stage>
+RHEC_ALWAYS_INLINE inline void form_rows(const RiccatiView& view, int i, const Stage& stage, const Memory<Stage>& at,
+                                         const typename Stage::R* W, typename Stage::R* X) {
+  using R = typename Stage::R;
   const auto form = [&](auto k) RHEC_ALWAYS_INLINE {
     R sums[2] = {at.row(at.H, k), R{}};
     stage.each_moved([&](auto l) RHEC_ALWAYS_INLINE { sums[l % R::chains].add(W[l], at.AB[l * at.stride + k]); });
@@ -298,8 +303,9 @@ RHEC_ALWAYS_INLINE inline bool factor_stage(const RiccatiView& view, int i, doub
   using R = typename Stage::R;
   const Stage stage(view, i);
   const Memory<Stage> at(view, i);
-  R X[Stage::most_columns];
-  form_rows(view, i, stage, at, X);
+  R W[Stage::most_states], X[Stage::most_columns];
+  multiply_rows(stage, at, W);
+  form_rows(view, i, stage, at, W, X);
   bool any_fixed = false;
   stage.each_control([&](auto k) RHEC_ALWAYS_INLINE { any_fixed |= at.sides[k] != 0; });
   view.fixes[i] = any_fixed;
@@ -503,6 +509,91 @@ bool factor_general(const RiccatiView& view, int i, double tolerance) {
   if (view.for_steps) {
     for (int v = 0; v < width; v += lane_count) kernels::store(Lanes{}, at.drift + v);
     all_columns.accumulate(1.0, next_states, at.P_next, stride, at.b, at.drift);
+  }
+  return true;
+}
+
+/// Controls behind the first two of a stage, of rows with sixteen columns at most.
+constexpr int most_further_controls = 9;
+
+/// What factor_stage does, for a stage with more controls than the two of its shape, as process noise adds them. The
+/// matrix is symmetric: of the further controls only the rows are formed, of all others only the columns of the shape.
+/// A further row is that of its coupling to the shape's columns, with `own` for its coupling to itself and to further
+/// controls before it. The order of elimination, and so what is stored, are those of eliminate_controls.
+template <class Stage, int known_further>
+RHEC_ALWAYS_INLINE inline bool factor_further_stage(const RiccatiView& view, int i, double tolerance) {
+  using R = typename Stage::R;
+  constexpr Constant<Stage::most_states> first;
+  constexpr Constant<Stage::most_states + 1> second;
+  const Stage stage(view, i);
+  const Memory<Stage> at(view, i);
+  const int further = known_further > 0 ? known_further : view.control_counts[i] - 2;
+  bool any_fixed = false;
+  for (int k = stage.offset; k < stage.columns + further; ++k) any_fixed |= at.sides[k] != 0;
+  if (any_fixed) return factor_general(view, i, tolerance);
+  view.fixes[i] = 0;
+  constexpr int room = known_further > 0 ? known_further : most_further_controls;
+  R W[Stage::most_states], X[Stage::most_columns], coupling[room];
+  double own[room][room], diagonal[room];
+  multiply_rows(stage, at, W);
+  for (int c = 0; c < further; ++c) {
+    const int k = stage.columns + c;
+    R push{}, sum = at.row(at.H, k);  // P times its column of B, and its row
+    stage.each_moved([&](auto l) RHEC_ALWAYS_INLINE {
+      const double entry = at.AB[l * at.stride + k];
+      push.add(at.row(at.P_next, l), entry);
+      sum.add(W[l], entry);
+    });
+    coupling[c] = sum.first(stage.columns);
+    for (int before = 0; before <= c; ++before) {
+      double of_both = at.H[k * at.stride + stage.columns + before];
+      stage.each_moved(
+          [&](auto l) RHEC_ALWAYS_INLINE { of_both += push.entry(l) * at.AB[l * at.stride + stage.columns + before]; });
+      own[c][before] = of_both;
+    }
+    if (view.diagonal) own[c][c] += view.diagonal[i * at.stride + k];
+    diagonal[c] = own[c][c];
+  }
+  form_rows(view, i, stage, at, W, X);
+  const double whole_first = X[first].entry(first), whole_second = X[second].entry(second);
+  bool is_definite = true;
+  for (int c = further - 1; c >= 0; --c) {
+    const double pivot = own[c][c], inverse = 1.0 / pivot;
+    is_definite = is_definite && pivot > tolerance * diagonal[c] && pivot > 0.0;
+    at.inverse[2 + c] = inverse;
+    R scaled{};
+    scaled.add(coupling[c], inverse);
+    for (int before = 0; before < c; ++before) {
+      const double factor = own[c][before] * inverse;
+      coupling[before].add(coupling[c], -factor);
+      for (int j = 0; j <= before; ++j) own[before][j] -= factor * own[c][j];
+    }
+    const auto eliminate = [&](auto j) RHEC_ALWAYS_INLINE { X[j].add(coupling[c], -scaled.splat(j)); };
+    stage.each_control(eliminate);
+    stage.each_state(eliminate);
+    double* const U = at.U + (2 + c) * at.stride;
+    coupling[c].to(U);
+    for (int before = 0; before < c; ++before) U[stage.columns + before] = own[c][before];
+  }
+  const double a = X[first].entry(first), b = X[second].entry(first), c = X[second].entry(second);
+  is_definite = is_definite && c > tolerance * whole_second && a * c - b * b > tolerance * (whole_first * c);
+  if (!eliminate_pair(stage, at, tolerance, X) || !is_definite) return false;
+  stage.each_control([&](auto k) RHEC_ALWAYS_INLINE { X[k].to(at.V + (k - stage.offset) * at.stride); });
+  R policies[room];
+  for (int k = 0; k < further; ++k) {
+    R policy = coupling[k].first(stage.states);
+    policy.add(X[first], -coupling[k].splat(first));
+    policy.add(X[second], -coupling[k].splat(second));
+    for (int before = 0; before < k; ++before) policy.add(policies[before], -own[k][before]);
+    policies[k] = R{};
+    policies[k].add(policy, at.inverse[2 + k]);
+    policies[k].to(at.V + (2 + k) * at.stride);
+  }
+  stage.each_state([&](auto j) RHEC_ALWAYS_INLINE { X[j].first(stage.states).to(at.P + j * at.stride); });
+  if (view.for_steps) {
+    R drift{};
+    stage.each_next_state([&](auto l) RHEC_ALWAYS_INLINE { drift.add(at.row(at.P_next, l), at.b[l]); });
+    drift.to(at.drift);
   }
   return true;
 }
@@ -850,18 +941,51 @@ inline bool is_alike(const RiccatiView& view, int i, int j) {
          view.state_counts[j + 1] == view.state_counts[i + 1];
 }
 
+/// Calls `function` with the type of the shape that a full stage has with the first two of its controls, and with the
+/// number of the others if that is compiled in (otherwise 0). False if there are no others, or the shape is not one of
+/// the compiled ones.
+template <bool is_written_out, class Function>
+inline bool with_further_controls(const RiccatiView& view, int i, const Function& function) {
+  const int states = view.states, carried = view.identity_counts[i], further = view.control_counts[i] - 2;
+  if (further <= 0 || view.stride != 16 || view.state_counts[i] != states || view.state_counts[i + 1] != states)
+    return false;
+  if (states == 6 && carried == 2) {
+    if (further == 1) return function.template operator()<Shape<1, 6, 2, true, 2, 16>, 1>(), true;
+    return function.template operator()<Shape<1, 6, 2, true, 2, 16>, 0>(), true;
+  }
+  if (states == 5 && carried == 2) return function.template operator()<Shape<1, 5, 2, true, 2, 16>, 0>(), true;
+  if (states == 7 && carried == 2)
+    return function.template operator()<Shape<2, 7, 2, is_written_out, 2, 16>, 0>(), true;
+  if (states == 7 && carried == 3)
+    return function.template operator()<Shape<2, 7, 2, is_written_out, 3, 16>, 0>(), true;
+  if (states == 8 && carried == 3)
+    return function.template operator()<Shape<2, 8, 2, is_written_out, 3, 16>, 0>(), true;
+  if (states == 8 && carried == 4)
+    return function.template operator()<Shape<2, 8, 2, is_written_out, 4, 16>, 0>(), true;
+  return false;
+}
+
 int factor(const RiccatiView& view, int first, double tolerance) {
   for (int i = first; i >= 0;) {
     if (view.special[i]) return i;
-    const bool done = with_shape<matrices_fit>(view, i, [&]<class Stage>() {
-      if constexpr (!Stage::is_known && Stage::most_columns > 8)
-        return factor_general(view, i, tolerance) && (--i, true);
+    bool done = false;
+    const bool has_further = with_further_controls<matrices_fit>(view, i, [&]<class Stage, int further>() {
       const int alike = i;
       do
-        if (!factor_stage<Stage>(view, i, tolerance)) return false;
+        if (!factor_further_stage<Stage, further>(view, i, tolerance)) return;
       while (--i >= 0 && is_alike(view, alike, i));
-      return true;
+      done = true;
     });
+    if (!has_further)
+      done = with_shape<matrices_fit>(view, i, [&]<class Stage>() {
+        if constexpr (!Stage::is_known && Stage::most_columns > 8)
+          return factor_general(view, i, tolerance) && (--i, true);
+        const int alike = i;
+        do
+          if (!factor_stage<Stage>(view, i, tolerance)) return false;
+        while (--i >= 0 && is_alike(view, alike, i));
+        return true;
+      });
     if (!done) return i;
   }
   return -1;
@@ -1288,9 +1412,11 @@ void form_general(const RiccatiView& view, int i, double* out) {
 void form(const RiccatiView& view, int i, double* out) {
   with_shape<matrices_fit, true, false>(view, i, [&]<class Stage>() {
     if constexpr (Stage::is_known) {
-      typename Stage::R X[Stage::most_columns]{};
+      typename Stage::R W[Stage::most_states], X[Stage::most_columns]{};
       const Stage stage(view, i);
-      form_rows(view, i, stage, Memory<Stage>(view, i), X);
+      const Memory<Stage> at(view, i);
+      multiply_rows(stage, at, W);
+      form_rows(view, i, stage, at, W, X);
       for (int k = 0; k < stage.columns; ++k) X[k].to(out + static_cast<long>(k) * view.stride);
     } else {
       form_general(view, i, out);

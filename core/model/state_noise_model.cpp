@@ -43,9 +43,15 @@ struct Columns {
   double share;                             ///< of a w: half with one at the end
 };
 
-/// A number that is known, so that no library is called for it.
-void clear_eight(double* row) {
-  for (int k = 0; k < 8; ++k) row[k] = 0.0;
+/// Sets the entries from `first` to `width`, a multiple of eight, of so many rows to zero. Mostly they are eight, a
+/// number that is known, so that no library is called for it.
+void clear_behind(int first, int width, int rows, double* matrix, std::ptrdiff_t step) {
+  const int first_eight = padded(first);
+  for (double* row = matrix; rows > 0; --rows, row += step) {
+    for (int c = first; c < first_eight; ++c) row[c] = 0.0;
+    for (int c = first_eight; c < width; c += 8)
+      for (int k = 0; k < 8; ++k) row[c + k] = 0.0;
+  }
 }
 
 }  // namespace
@@ -89,9 +95,35 @@ std::size_t StateNoiseModel::rows_scratch(int count) const noexcept {
   return static_cast<std::size_t>(count) * padded(z) + 8 + vehicle_->rows_scratch(count);
 }
 
-/// The vehicle writes its rows to where they are wanted. Where noise stands between its columns, it is given rows of z
-/// without noise, and its results are moved apart.
+/// Noise that is an input stands behind all columns of the vehicle, which writes its rows to where they are wanted.
+void StateNoiseModel::integrate_in_place(const IntervalRows& request) const noexcept {
+  vehicle_->integrate_rows(request);
+  const int nx = state_count(), ni = static_cast<int>(states_.size());
+  const int first = nx + vehicle_->parameter_count() + vehicle_->input_count(), width = padded(first + ni);
+  const int* const states = states_.data();
+  for (int i = 0; i < request.count; ++i) {
+    const double root = std::sqrt(request.durations[i]);
+    if (request.next_states) {
+      const double* const noises = request.z + i * request.z_step + first;
+      double* const next = request.next_states + i * request.next_step;
+      for (int k = 0; k < ni; ++k) next[states[k]] += root * noises[k];
+    }
+    if (request.jacobians) {
+      double* const J = request.jacobians + i * request.jacobian_step;
+      clear_behind(first, width, nx, J, request.jacobian_row);
+      for (int k = 0; k < ni; ++k) J[states[k] * request.jacobian_row + first + k] = root;
+    }
+    if (request.hessians) {
+      double* const H = request.hessians + i * request.hessian_step;
+      clear_behind(first, width, first, H, request.hessian_row);
+      for (int k = first; k < first + ni; ++k) std::fill_n(H + k * request.hessian_row, width, 0.0);
+    }
+  }
+}
+
+/// The vehicle is given rows of z without noise, and its results are moved apart.
 void StateNoiseModel::integrate_rows(const IntervalRows& request) const noexcept {
+  if (!request.ramp && blocked_.empty()) return integrate_in_place(request);
   const std::ptrdiff_t nx = state_count(), nu = vehicle_->input_count(), np = vehicle_->parameter_count(),
                        ni = std::ssize(states_), nw = std::ssize(blocked_);
   const std::ptrdiff_t narrow = nx + np + nu + (request.ramp ? np : 0),
@@ -100,8 +132,6 @@ void StateNoiseModel::integrate_rows(const IntervalRows& request) const noexcept
                       .parameters = nx + np,
                       .ends = nx + 2 * np + nw + nu + ni,
                       .share = request.ramp ? 0.5 : 1.0};
-  const bool in_place = is_in_place(request.ramp);
-  const std::ptrdiff_t first_eight = padded(static_cast<int>(noise.inputs));
   // Where a column of the vehicle's [x; p; u; p_end] is in [x; p; w; u; xi; p_end; w_end]: never before its own place.
   const auto place = [&](std::ptrdiff_t c) { return c < nx + np ? c : c < nx + np + nu ? c + nw : c + nw + ni; };
   const auto spread = [&](double* row) {
@@ -112,15 +142,13 @@ void StateNoiseModel::integrate_rows(const IntervalRows& request) const noexcept
   };
   IntervalRows of_vehicle = request;
   Scratch memory(request.scratch);
-  if (!in_place) {
-    const std::ptrdiff_t step = padded(static_cast<int>(narrow));
-    double* const z = memory.take(request.count * step);
-    for (int i = 0; i < request.count; ++i)
-      for (std::ptrdiff_t c = 0; c < narrow; ++c) z[i * step + c] = request.z[i * request.z_step + place(c)];
-    of_vehicle.z = z;
-    of_vehicle.z_step = step;
-    of_vehicle.scratch = memory.rest();
-  }
+  const std::ptrdiff_t step = padded(static_cast<int>(narrow));
+  double* const without_noise = memory.take(request.count * step);
+  for (int i = 0; i < request.count; ++i)
+    for (std::ptrdiff_t c = 0; c < narrow; ++c) without_noise[i * step + c] = request.z[i * request.z_step + place(c)];
+  of_vehicle.z = without_noise;
+  of_vehicle.z_step = step;
+  of_vehicle.scratch = memory.rest();
   vehicle_->integrate_rows(of_vehicle);
   for (int i = 0; i < request.count; ++i) {
     const double root = std::sqrt(request.durations[i]), part = noise.share * root;
@@ -134,16 +162,7 @@ void StateNoiseModel::integrate_rows(const IntervalRows& request) const noexcept
     if (request.jacobians) {
       double* const J = request.jacobians + i * request.jacobian_step;
       const std::ptrdiff_t row = request.jacobian_row;
-      if (in_place) {
-        double* of_state = J;
-        for (std::ptrdiff_t r = 0; r < nx; ++r, of_state += row) {
-          for (std::ptrdiff_t c = noise.inputs; c < first_eight; ++c) of_state[c] = 0.0;
-          if (first_eight < width) clear_eight(of_state + first_eight);
-          for (std::ptrdiff_t c = first_eight + 8; c < width; c += 8) clear_eight(of_state + c);
-        }
-      } else {
-        for (std::ptrdiff_t r = 0; r < nx; ++r) spread(J + r * row);
-      }
+      for (std::ptrdiff_t r = 0; r < nx; ++r) spread(J + r * row);
       for (std::ptrdiff_t k = 0; k < ni; ++k) J[states_[k] * row + noise.inputs + k] = root;
       for (std::ptrdiff_t k = 0; k < nw; ++k) {
         J[blocked_[k] * row + noise.parameters + k] = part;

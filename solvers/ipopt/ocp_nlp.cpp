@@ -42,7 +42,7 @@ bool copy_finite(std::span<const double> from, double factor, double* __restrict
 
 /// Bitwise equality.
 bool are_equal(std::span<const double> one, const double* other) {
-  return std::memcmp(one.data(), other, one.size_bytes()) == 0;
+  return one.empty() || std::memcmp(one.data(), other, one.size_bytes()) == 0;
 }
 
 void write_pattern(const SparseNlp::Pattern& pattern, int* rows, int* columns) {

@@ -33,6 +33,10 @@ constexpr std::size_t most_latencies = 100000;
 constexpr auto after_rehearsal = std::chrono::microseconds(200);
 constexpr int most_long_rehearsals = 3;
 constexpr double most_of_step = 0.1;
+// Behind a rehearsal the loop does not sleep until the step begins, for a processor that sleeps takes a while to wake
+// up: but not for longer than this after it was due, and for this share of a step.
+constexpr auto awake_after_due = std::chrono::microseconds(300);
+constexpr double most_awake_of_step = 0.1;
 // Without a step that is due, the loop looks around so often.
 constexpr auto between_looks = std::chrono::milliseconds(100);
 constexpr std::size_t most_events = 1000;
@@ -193,6 +197,7 @@ Clock::time_point Loop::next_look() const {
 Clock::time_point Loop::wait_until() const {
   const bool is_due = estimator_ && !time_.is_simulated();
   if (!is_due) return Clock::now() + between_looks;
+  if (stays_awake()) return Clock::now();
   return may_rehearse() ? std::min(next_look(), expected() - after_rehearsal - rehearsal_) : next_look();
 }
 
@@ -203,6 +208,14 @@ Clock::time_point Loop::expected() const { return std::min(due_, last_received_ 
 /// back.
 bool Loop::may_rehearse() const {
   return !is_triggered_ && rehearsed_ != expected() && long_rehearsals_ < most_long_rehearsals;
+}
+
+/// Whether it looks for messages without sleeping, having rehearsed for a step that is expected now.
+bool Loop::stays_awake() const {
+  if (is_triggered_ || rehearsed_ != expected() || long_rehearsals_ > 0) return false;
+  const Clock::duration most =
+      std::min<Clock::duration>(of_step(step_, most_awake_of_step), after_rehearsal + awake_after_due);
+  return Clock::now() < expected() - after_rehearsal + most;
 }
 
 void Loop::rehearse() {

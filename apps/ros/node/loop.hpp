@@ -130,6 +130,7 @@ class Loop {
   Clock::time_point wait_until() const;
   Clock::time_point expected() const;
   bool may_rehearse() const;
+  bool stays_awake() const;
   void rehearse();
   void set_due(Clock::time_point begin, bool was_triggered);
 

@@ -1,10 +1,14 @@
 // The Riccati recursion, compared with dense systems, on every instruction set that this machine supports.
 #include "rhec/core/kernels/riccati_kernels.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
+
+#include <array>
+#include <utility>
 
 #include "rhec/core/kernels/kernel_sets.hpp"
 #include "rhec/core/qp/stage_qp_views.hpp"
@@ -123,6 +127,62 @@ TEST(RiccatiKernels, OfTheRecursionAgreeWithTheDenseSystem) {
   }
 }
 
+/// The last `count` states keep their values in all intervals.
+void carry_last(StageQp& qp, int count) {
+  for (int i = 0; i < qp.intervals(); ++i) {
+    const int states = qp.states(i);
+    for (int r = states - count; r < states; ++r) {
+      std::fill_n(qp.AB(i) + r * qp.stride(), qp.stride(), 0.0);
+      qp.AB(i)[r * qp.stride() + r] = 1.0;
+    }
+    qp.set_sizes(i, states, qp.controls(i), count);
+  }
+}
+
+/// A vehicle's two inputs and process noise: compiled for some numbers of states, of which some are parameters.
+TEST(RiccatiKernels, TakeFurtherControlsBehindTheFirstTwo) {
+  RandomQp random(21);
+  constexpr std::array<std::pair<int, int>, 6> sizes{{{5, 2}, {6, 2}, {7, 2}, {7, 3}, {8, 3}, {8, 4}}};
+  for (int trial = 0; trial < 240; ++trial) {
+    const auto [states, carried] = sizes[static_cast<std::size_t>(trial) % sizes.size()];
+    StageQp qp = random.make(random.integer(2, 5), states, random.integer(3, 16 - states), true);
+    carry_last(qp, carried);
+    const ActiveSet none(qp.capacity());
+    AlignedDoubles diagonal(static_cast<std::size_t>(qp.intervals() + 1) * qp.stride(), 0.0);
+    StageQp whole = qp;
+    const bool has_diagonal = trial % 3 == 0;
+    for (int i = 0; has_diagonal && i < qp.intervals(); ++i) {
+      for (int k = 0; k < states + qp.controls(i); ++k) {
+        const double more = diagonal[static_cast<std::size_t>(i) * qp.stride() + k] = random.uniform(0.0, 1.0);
+        whole.H(i)[k * (qp.stride() + 1)] += more;
+      }
+    }
+    const DenseQp dense(whole, none);
+    const Eigen::VectorXd z = dense.solve();
+    const int bent = random.integer(0, qp.intervals() - 1), control = random.integer(0, 15);
+    for (const KernelSet& set : runnable_kernels()) {
+      const auto where = [&](int i) {
+        return fmt::format("{}, {} states, {} carried, {} controls at stage {}", set.instruction_set, states, carried,
+                           qp.controls(i), i);
+      };
+      Recursion recursion(qp, none);
+      recursion.view.diagonal = has_diagonal ? diagonal.data() : nullptr;
+      recursion.solve(*set.riccati);
+      for (int i = 0; i <= qp.intervals(); ++i) {
+        for (int j = 0; j < states; ++j)
+          ASSERT_NEAR(recursion.step.state(i)[j], z[dense.state_at[i] + j], 1e-8) << where(i);
+        for (int j = 0; j < qp.controls(i); ++j)
+          ASSERT_NEAR(recursion.step.control(i)[j], z[dense.control_at[i] + j], 1e-8) << where(i);
+      }
+      if (qp.controls(bent) == 0) continue;
+      StageQp concave = qp;
+      R_of(concave, bent)(control % qp.controls(bent), control % qp.controls(bent)) = -1e4;
+      Recursion stopped(concave, none);
+      EXPECT_EQ(set.riccati->factor(stopped.view, qp.intervals() - 1, 1e-11), bent) << where(bent);
+    }
+  }
+}
+
 /// A symmetric matrix with its eigenvalues' absolute values, by Eigen.
 Eigen::Matrix2d reflected(const Eigen::Matrix2d& matrix) {
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(matrix);
@@ -227,13 +287,7 @@ TEST(RiccatiKernels, OfResponsesMayLeaveOutStatesThatKeepTheirValues) {
     const int states = trial % 2 == 0 ? random.integer(5, 8) : random.integer(2, 12), carried = random.integer(1, 3);
     StageQp qp = random.make(random.integer(1, 6), states, random.integer(2, 4), true);
     const int N = qp.intervals(), kept = std::min(carried, states - 1);
-    for (int i = 0; i < N; ++i) {
-      for (int r = states - kept; r < states; ++r) {
-        std::fill_n(qp.AB(i) + r * qp.stride(), qp.stride(), 0.0);
-        qp.AB(i)[r * qp.stride() + r] = 1.0;
-      }
-      qp.set_sizes(i, states, qp.controls(i), kept);
-    }
+    carry_last(qp, kept);
     const ActiveSet active = some_active_controls(random, qp);
     const int stage = random.integer(0, N);
     AlignedDoubles gradients(static_cast<std::size_t>(N + 1) * qp.stride() * response_batch, 0.0);

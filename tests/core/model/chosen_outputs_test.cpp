@@ -103,21 +103,22 @@ TEST(ChosenOutputs, MayBeThereTwiceUnderAnotherName) {
     // The weights of both count.
     for (std::size_t k = 0; k < one.hessians.size(); ++k) EXPECT_NEAR(two.hessians[k], one.hessians[k], 1e-12);
     // So they do in rows as solvers ask for them.
-    std::vector<double> rows(count * nx * padded(static_cast<int>(nx))), scratch(twice->rows_scratch(count));
+    const std::size_t row = padded(static_cast<int>(nx));
+    std::vector<double> rows(count * nx * row), state_rows(count * row), scratch(twice->rows_scratch(count));
+    for (std::size_t i = 0; i < count; ++i) std::copy_n(states.data() + i * nx, nx, state_rows.data() + i * row);
     twice->observe_rows({.count = static_cast<int>(count),
-                         .states = states.data(),
-                         .state_step = static_cast<std::ptrdiff_t>(nx),
+                         .states = state_rows.data(),
+                         .state_step = static_cast<std::ptrdiff_t>(row),
                          .multipliers = weights.data(),
                          .multiplier_step = 3,
                          .hessians = rows.data(),
-                         .hessian_step = static_cast<std::ptrdiff_t>(nx * padded(static_cast<int>(nx))),
-                         .hessian_row = padded(static_cast<int>(nx)),
+                         .hessian_step = static_cast<std::ptrdiff_t>(nx * row),
+                         .hessian_row = static_cast<std::ptrdiff_t>(row),
                          .scratch = scratch.data()});
     for (std::size_t i = 0; i < count; ++i)
       for (std::size_t r = 0; r < nx; ++r)
         for (std::size_t c = 0; c < nx; ++c)
-          EXPECT_NEAR(rows[(i * nx + r) * padded(static_cast<int>(nx)) + c], one.hessians[(i * nx + c) * nx + r],
-                      1e-12);
+          EXPECT_NEAR(rows[(i * nx + r) * row + c], one.hessians[(i * nx + c) * nx + r], 1e-12);
   }
 }
 

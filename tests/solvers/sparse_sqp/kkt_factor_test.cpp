@@ -1,6 +1,7 @@
 #include "solvers/sparse_sqp/kkt_factor.hpp"
 
 #include <gtest/gtest.h>
+#include <Eigen/LU>
 
 #include <cmath>
 #include <memory>

@@ -49,7 +49,7 @@ class RHEC_EXPORT StateNoiseModel final : public Model {
  private:
   void integrate_some(const Intervals& request, std::ptrdiff_t first, std::ptrdiff_t count,
                       double* memory) const noexcept;
-  bool is_in_place(bool ramp) const noexcept { return !ramp && blocked_.empty(); }
+  void integrate_in_place(const IntervalRows& request) const noexcept;
 
   std::shared_ptr<const Model> vehicle_;
   std::vector<int> states_, blocked_;
