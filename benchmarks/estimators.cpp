@@ -71,12 +71,12 @@ class Forwarding final : public EstimationMethod {
   void start(Measured outputs) noexcept override {
     inner_->start(outputs);
     time_ = 0.0;
-    for (Beside& other : others_) other.estimator->push_measurement(time_, outputs);
+    for (Beside& other : others_) other.estimator->push_measurement(time_, outputs.values);
   }
   void add(const MeasuredInterval& interval, Measured outputs) noexcept override {
     inner_->add(interval, outputs);
     const double now = time_ + interval.duration;
-    Late sample{now, std::vector<double>(outputs, outputs + model().output_count()), {}};
+    Late sample{now, std::vector<double>(outputs.values, outputs.values + model().output_count()), {}};
     sample.fixes.assign(sample.others.size(), std::numeric_limits<double>::quiet_NaN());
     const bool is_outlier = trouble_.outliers > 0.0 && random_.uniform() < trouble_.outliers;
     for (std::size_t j = 0; j < sample.fixes.size(); ++j) {

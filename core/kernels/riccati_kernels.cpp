@@ -950,6 +950,8 @@ inline bool with_further_controls(const RiccatiView& view, int i, const Function
   if (further <= 0 || view.stride != 16 || view.state_counts[i] != states || view.state_counts[i + 1] != states)
     return false;
   if (states == 6 && carried == 2) {
+    // Whole shapes of these, unrolled in the widest registers, have fewer dependent operations.
+    if (is_written_out && (further == 2 || further == 4)) return false;
     if (further == 1) return function.template operator()<Shape<1, 6, 2, true, 2, 16>, 1>(), true;
     return function.template operator()<Shape<1, 6, 2, true, 2, 16>, 0>(), true;
   }
