@@ -47,6 +47,13 @@ Clock::duration of_step(Clock::duration step, double share) {
   return std::chrono::duration_cast<Clock::duration>(step * share);
 }
 
+/// Processors that this process may run on.
+int processor_count() {
+  cpu_set_t processors;
+  CPU_ZERO(&processors);
+  return sched_getaffinity(0, sizeof(processors), &processors) == 0 ? CPU_COUNT(&processors) : 1;
+}
+
 /// What does not steer needs no form that its model is made for.
 CommandOptions command_options(const RosOptions& options) {
   CommandOptions command = options.command;
@@ -88,7 +95,8 @@ Loop::Loop(Participant& wire, const LiveTopics& topics, Intake& intake, const Ro
       command_message_(robot.model(), command_options(options), robot.step()),
       track_messages_(robot, {options.frames.fixed, options.frames.vehicle}),
       step_(std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(robot.step()))),
-      time_(options.use_sim_time) {
+      time_(options.use_sim_time),
+      has_other_processor_(processor_count() > 1) {
   forget_inputs_and_outputs();
   report_.latencies.reserve(most_latencies);
   report_.other.topic = "others";
@@ -210,9 +218,10 @@ bool Loop::may_rehearse() const {
   return !is_triggered_ && rehearsed_ != expected() && long_rehearsals_ < most_long_rehearsals;
 }
 
-/// Whether it looks for messages without sleeping, having rehearsed for a step that is expected now.
+/// Whether it looks for messages without sleeping, having rehearsed for a step that is expected now. Whatever receives
+/// messages needs another processor for that.
 bool Loop::stays_awake() const {
-  if (is_triggered_ || rehearsed_ != expected() || long_rehearsals_ > 0) return false;
+  if (!has_other_processor_ || is_triggered_ || rehearsed_ != expected() || long_rehearsals_ > 0) return false;
   const Clock::duration most =
       std::min<Clock::duration>(of_step(step_, most_awake_of_step), after_rehearsal + awake_after_due);
   return Clock::now() < expected() - after_rehearsal + most;

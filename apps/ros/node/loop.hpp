@@ -161,6 +161,7 @@ class Loop {
   Clock::time_point rehearsed_;                                              ///< for the step that was due then
   Clock::duration rehearsal_{};                                              ///< how long one takes
   int long_rehearsals_ = 0;                                                  ///< in a row
+  bool has_other_processor_;
   logs::Stamp start_ = 0;
   bool has_told_standstill_ = false, has_told_waiting_ = false;
   bool is_triggered_ = false, is_stopped_by_topic_ = false, has_driven_ = false, rests_ = true;
