@@ -156,15 +156,7 @@ TEST(DualLimits, CorrectRoundingBySensitivitiesWhereEachQpHasToBeCheap) {
       for (int j = 0; j < qp.stride(); ++j) differs |= step.row(i)[j] != other.row(i)[j];
     corrected += differs;
     EXPECT_LT(distance(qp, step, other), 1e-9 * size) << trial;
-    // Rounding goes by the largest multiplier, a hundred times the gradients and more where limits are nearly
-    // dependent.
-    double largest = 0.0;
-    for (int i = 0; i <= qp.intervals(); ++i) {
-      for (int r = 0; r < qp.limits(i); ++r) largest = std::max(largest, std::abs(step.limit_bound(i)[r]));
-      for (int j = 0; j < qp.stride(); ++j)
-        largest = std::max({largest, std::abs(step.costate(i)[j]), std::abs(step.bound_row(i)[j])});
-    }
-    EXPECT_LT(kkt_violation(qp, other), 1e-9 * largest) << trial;
+    EXPECT_LT(kkt_violation(qp, other), 1e-7 * size + 10.0 * kkt_violation(qp, step)) << trial;
     // Bounds and limits are met as well as by the other.
     for (int i = 0; i <= qp.intervals(); ++i) {
       for (int j = 0; i < qp.intervals() && j < qp.controls(i); ++j) {
