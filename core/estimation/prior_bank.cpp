@@ -27,8 +27,11 @@ constexpr int lanes_at_once = 8;
 constexpr int outputs_at_once = 8;
 /// Below this probability a member's weight does not fall, so that it can come back.
 constexpr double least_weight = 1e-10;
-/// So many times the range of its bounds a state or a parameter of a member may be beyond them.
-constexpr double far_beyond = 3.0;
+/// So many times the range of its bounds a state, or a parameter, of a member may be beyond them. What spinning wheels
+/// ask for lies farther than slip can be, but not much.
+constexpr double state_room = 3.0, parameter_room = 0.5;
+/// The least share of the ground that a vehicle would cover without slip which it counts as covering.
+constexpr double least_grip = 0.5;
 
 /// Fills up the states of one prior to those of all priors of its parameter, so that a state has one meaning for all
 /// members that are mixed. Where a prior has no mean, its mean is the parameter; where it has no derivatives, these are
@@ -138,14 +141,14 @@ PriorBank::PriorBank(std::shared_ptr<const Model> model, Setup setup)
     n_ += process.count;
     processes_.push_back(std::move(process));
   }
-  const auto limit = [this](int entry, const Variable& about) {
-    const double room = far_beyond * (about.upper - about.lower);
+  const auto limit = [this](int entry, const Variable& about, double share) {
+    const double room = share * (about.upper - about.lower);
     if (!std::isfinite(room)) return;
     limited_.push_back(entry);
     limits_.insert(limits_.end(), {about.lower - room, about.upper + room});
   };
-  for (int j = 0; j < nx_; ++j) limit(j, model_->description().states[j]);
-  for (int j = 0; j < np_; ++j) limit(processes_[j].first, model_->description().parameters[j]);
+  for (int j = 0; j < nx_; ++j) limit(j, model_->description().states[j], state_room);
+  for (int j = 0; j < np_; ++j) limit(processes_[j].first, model_->description().parameters[j], parameter_room);
   const auto n = static_cast<std::size_t>(n_), M = static_cast<std::size_t>(lanes_), nx = static_cast<std::size_t>(nx_);
   const std::size_t columns = nx + nu_ + 2 * np_;
   mean_.assign(n * M, 0.0);
@@ -423,28 +426,42 @@ double PriorBank::take_outputs(const Frame& frame, const double* y, const double
   return log_likelihood;
 }
 
-/// Ground covered on an interval, from the vehicle's motion at the mixture's mean.
+/// Ground covered on an interval, from the vehicle's motion at the mixture's mean: at least a share of what it would be
+/// without slip. Wheels that spin on the spot cover none, and yet may grip at once: by no law along the ground would
+/// slip vary meanwhile, and all of them would have it for known when they grip.
 void PriorBank::find_distance(const double* input, double duration) noexcept {
   const Roles& roles = model_->description().roles;
+  double *const nominal_state = states_.data() + nx_, *const nominal = parameters_.data() + np_;
   std::fill_n(states_.data(), nx_, 0.0);
   std::fill_n(parameters_.data(), np_, 0.0);
   for (int m = 0; m < members_; ++m) {
     for (int r = 0; r < nx_; ++r) states_[r] += weights_[m] * mean_[r * lanes_ + m];
     for (int j = 0; j < np_; ++j) parameters_[j] += weights_[m] * mean_[processes_[j].first * lanes_ + m];
   }
-  const double least = setup_.least_speed * duration;
-  distance_ = least;
+  distance_ = setup_.least_speed * duration;
   if (roles.position_x < 0 || roles.position_y < 0) return;
-  model_->integrate({.count = 1,
+  std::copy_n(states_.data(), nx_, nominal_state);
+  for (int j = 0; j < np_; ++j) nominal[j] = model_->description().parameters[j].nominal;
+  for (int row = 0; row < 2; ++row) std::copy_n(input, nu_, inputs_.data() + static_cast<std::ptrdiff_t>(row) * nu_);
+  std::fill_n(durations_.data(), 2, duration);
+  model_->integrate({.count = 2,
                      .states = states_.data(),
-                     .inputs = input,
+                     .inputs = inputs_.data(),
                      .parameters = parameters_.data(),
-                     .durations = &duration,
+                     .durations = durations_.data(),
                      .substeps = setup_.substeps,
                      .next_states = next_rows_.data()});
-  const double covered = std::hypot(next_rows_[roles.position_x] - states_[roles.position_x],
-                                    next_rows_[roles.position_y] - states_[roles.position_y]);
-  if (std::isfinite(covered)) distance_ = std::max(least, covered);
+  const auto covered = [&](int row) {
+    const double *const from = states_.data() + static_cast<std::ptrdiff_t>(row) * nx_, *const to =
+                                                                                            next_rows_.data() +
+                                                                                            static_cast<std::ptrdiff_t>(
+                                                                                                row) *
+                                                                                                nx_;
+    const double way =
+        std::hypot(to[roles.position_x] - from[roles.position_x], to[roles.position_y] - from[roles.position_y]);
+    return std::isfinite(way) ? way : 0.0;
+  };
+  distance_ = std::max({distance_, covered(0), least_grip * covered(1)});
 }
 
 /// F and Q of every process over the interval.

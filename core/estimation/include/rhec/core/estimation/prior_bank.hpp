@@ -19,7 +19,7 @@ namespace rhec {
 /// Extended Kalman filters with different priors of the parameters, side by side in the processor's lanes and mixed as
 /// interacting multiple models (Blom and Bar-Shalom 1988; docs/method.md, section 8). Each works on [x; z], where z are
 /// the states of its processes. With one member it is the Kalman filter of that prior. The ground covered on an
-/// interval comes from the vehicle's motion at the mixture's mean, and is then data.
+/// interval comes from the vehicle's motion at the mixture's mean, and is then data; see `distance`.
 ///
 /// Values that are not finite, or lead to such, are skipped. Allocates in its constructor only.
 class RHEC_EXPORT PriorBank {
@@ -109,7 +109,7 @@ class RHEC_EXPORT PriorBank {
   };
   Noise noise(int output) const noexcept;
 
-  /// Ground covered on the last interval [m].
+  /// Ground covered on the last interval [m], at least half of what it would be without slip.
   double distance() const noexcept { return distance_; }
 
  private:
