@@ -143,6 +143,10 @@ Controller::Controller(std::shared_ptr<const Model> model, std::shared_ptr<Solve
   solver_->setup(problem_);
   const Model& vehicle = *vehicle_;
   command_.inputs.assign(vehicle.input_count(), 0.0);
+  if (const TermFunctions* terms = problem_.terms().functions(); terms && terms->limit_count() > 0) {
+    command_.violations.assign(static_cast<std::size_t>(terms->limit_count()), 0.0);
+    limit_values_.assign((static_cast<std::size_t>(N) + 1) * problem_.capacity().limit_row(), 0.0);
+  }
   last_inputs_.assign(vehicle.input_count(), std::numeric_limits<double>::quiet_NaN());
   const auto nx = static_cast<std::size_t>(vehicle.state_count()), nu = static_cast<std::size_t>(vehicle.input_count());
   for (std::vector<double>* motion : {&straight_, &slipless_, &largest_, &smallest_}) motion->assign(nx + nu, 0.0);
@@ -486,9 +490,28 @@ void Controller::finish() noexcept {
   if (is_finished_) return;
   is_finished_ = true;
   solver_->finish(point_, command_.report);
+  measure_violations();
   if (!has_plan_) return;
   shifter_.take(problem_, point_);
   if (!command_.fallback) has_plan_ = is_finite(problem_, point_);
+}
+
+/// Of the limits that the vehicle meets next, whose data are still those of the last sample.
+void Controller::measure_violations() noexcept {
+  if (command_.violations.empty()) return;
+  std::fill(command_.violations.begin(), command_.violations.end(), 0.0);
+  problem_.evaluate_limits(point_, limit_values_.data(), scratch_);
+  const HorizonTerms& terms = problem_.terms();
+  for (int i = 0; i <= 1; ++i) {
+    const TermFunctions::Rows* rows = terms.rows(i, problem_.intervals(), true);
+    const double* values = limit_values_.data() + static_cast<std::ptrdiff_t>(i) * problem_.capacity().limit_row();
+    for (int r = 0; rows && r < rows->limits; ++r) {
+      const int limit = rows->first_limit + r;
+      const double beyond = std::max(terms.lower(i)[limit] - values[r], values[r] - terms.upper(i)[limit]);
+      double& most = command_.violations[static_cast<std::size_t>(limit)];
+      most = std::max(most, beyond);
+    }
+  }
 }
 
 void Controller::prepare() noexcept {
