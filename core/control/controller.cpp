@@ -22,6 +22,9 @@ namespace {
 // A heading whose standard deviation is larger does not count in the search for the vehicle's place [rad].
 constexpr double known_heading = 0.5;
 
+// A plan that covers less than this share of the path's way, and turns by less than this, is one to stand.
+constexpr double standing_share = 0.1, standing_turn = 0.1;  // [1], [rad]
+
 /// The problem's state that holds an input whose rate has a weight or bounds, or -1.
 std::vector<int> find_held_states(const Model& model, const Controller::Setup& setup) {
   const ModelDescription& about = model.description();
@@ -479,10 +482,23 @@ const Controller::Command& Controller::control(const Estimate& estimate, Clock::
     if (!from_plan || !shifter_.apply(1, problem_, point_)) start_cold();
     plan_inputs(0, command_.inputs.data());
   }
+  command_.faces_away = faces_away();
   keep_within_bounds();
   RHEC_ASSERT(all_finite(command_.inputs), "a command is finite");
   is_finished_ = false;
   return command_;
+}
+
+/// Whether a plan neither moves nor turns a vehicle that looks the other way.
+bool Controller::faces_away() const noexcept {
+  const Roles& roles = vehicle_->description().roles;
+  if (roles.heading < 0 || !(std::abs(command_.heading_error) > 0.5 * std::numbers::pi)) return false;
+  const int N = problem_.intervals();
+  const double *from = point_.state(0), *to = point_.state(N);
+  const double way =
+      std::hypot(to[roles.position_x] - from[roles.position_x], to[roles.position_y] - from[roles.position_y]);
+  const double wanted = arc_lengths_[static_cast<std::size_t>(N)] - arc_lengths_[0];
+  return way < standing_share * wanted && std::abs(to[roles.heading] - from[roles.heading]) < standing_turn;
 }
 
 /// Work that the robot need not wait for: assess and keep the plan before the problem changes to the next sample.

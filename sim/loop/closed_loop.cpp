@@ -194,7 +194,8 @@ RunLog run_closed_loop(const Scenario& scenario, const LoopHooks& hooks) {
       break;
     }
     if (k >= limit) {
-      log.ended = "the vehicle took more than three times as long as it should have";
+      log.ended = command.faces_away ? "the vehicle stands, facing away from the path"
+                                     : "the vehicle took more than three times as long as it should have";
       break;
     }
     begin(LoopPart::simulate);

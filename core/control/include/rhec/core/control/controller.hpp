@@ -76,6 +76,9 @@ class RHEC_EXPORT Controller {
     double heading_error = 0.0;  ///< heading of the estimate - that of the reference, in (-pi, pi] [rad]
     bool relaxed = false;        ///< a state bound was out of reach from the estimate and was relaxed
     double pace = 1.0;           ///< share of the path's speeds that is driven at present
+    /// The vehicle faces away from the path, and its plan is to stand: no way round is worth it within the horizon, so
+    /// that it stays there until somebody turns it, or the path is another.
+    bool faces_away = false;
     /// By limit of the terms (TermFunctions::limit_names), how far what follows next is beyond it: the plan's first
     /// interval and the node at its end; 0: it is kept. Of this sample from `finish` on.
     std::vector<double> violations;
@@ -128,6 +131,7 @@ class RHEC_EXPORT Controller {
   void keep_within_bounds() noexcept;
   bool find_plan(Clock::time_point deadline) noexcept;
   void measure_violations() noexcept;
+  bool faces_away() const noexcept;
 
   Setup setup_;
   std::shared_ptr<const Model> vehicle_;
