@@ -102,6 +102,18 @@ void print_health(const sim::RunSummary& summary) {
       summary.counts.clocks_set);
 }
 
+/// Which limits of the controller were not kept, where any was not.
+void print_limits(const sim::RunSummary& summary) {
+  bool is_first = true;
+  for (const auto& [name, record] : summary.limits) {
+    if (record.violated == 0) continue;
+    if (is_first) fmt::print("{:<44} {:>12} {:>12}\n", "LIMIT VIOLATED", "IN SAMPLES", "AT MOST BY");
+    is_first = false;
+    fmt::print("{:<44} {:>12} {:>12.3g}\n", name, fmt::format("{} of {}", record.violated, summary.steps), record.most);
+  }
+  if (!is_first) fmt::print("\n");
+}
+
 void print_table(const sim::RunSummary& summary, const sim::Scenario& scenario, const std::filesystem::path& folder) {
   fmt::print("{:<12} {:>12} {:>12}\n", "ERROR", "MEAN ABS", "RMS");
   for (const auto& [name, value] : summary.mae.parameters)
@@ -111,6 +123,7 @@ void print_table(const sim::RunSummary& summary, const sim::Scenario& scenario, 
   fmt::print("{:<12} {:>10.3f} m {:>10.3f} m\n\n", "tracking", summary.mae.tracking, summary.rmse.tracking);
   print_certainty(summary);
   print_noise(summary, scenario);
+  print_limits(summary);
   fmt::print("{:<12} {:>12} {:>12} {:>12}\n", "SOLVE [us]", "MEDIAN", "P99", "MAX");
   const auto times = [](const char* name, const sim::Spread& t) {
     fmt::print("{:<12} {:>12.1f} {:>12.1f} {:>12.1f}\n", name, t.median, t.p99, t.max);

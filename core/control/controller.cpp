@@ -22,6 +22,9 @@ namespace {
 // A heading whose standard deviation is larger does not count in the search for the vehicle's place [rad].
 constexpr double known_heading = 0.5;
 
+// A plan that covers less than this share of the path's way, and turns by less than this, is one to stand.
+constexpr double standing_share = 0.1, standing_turn = 0.1;  // [1], [rad]
+
 /// The problem's state that holds an input whose rate has a weight or bounds, or -1.
 std::vector<int> find_held_states(const Model& model, const Controller::Setup& setup) {
   const ModelDescription& about = model.description();
@@ -143,6 +146,10 @@ Controller::Controller(std::shared_ptr<const Model> model, std::shared_ptr<Solve
   solver_->setup(problem_);
   const Model& vehicle = *vehicle_;
   command_.inputs.assign(vehicle.input_count(), 0.0);
+  if (const TermFunctions* terms = problem_.terms().functions(); terms && terms->limit_count() > 0) {
+    command_.violations.assign(static_cast<std::size_t>(terms->limit_count()), 0.0);
+    limit_values_.assign((static_cast<std::size_t>(N) + 1) * problem_.capacity().limit_row(), 0.0);
+  }
   last_inputs_.assign(vehicle.input_count(), std::numeric_limits<double>::quiet_NaN());
   const auto nx = static_cast<std::size_t>(vehicle.state_count()), nu = static_cast<std::size_t>(vehicle.input_count());
   for (std::vector<double>* motion : {&straight_, &slipless_, &largest_, &smallest_}) motion->assign(nx + nu, 0.0);
@@ -475,10 +482,23 @@ const Controller::Command& Controller::control(const Estimate& estimate, Clock::
     if (!from_plan || !shifter_.apply(1, problem_, point_)) start_cold();
     plan_inputs(0, command_.inputs.data());
   }
+  command_.faces_away = faces_away();
   keep_within_bounds();
   RHEC_ASSERT(all_finite(command_.inputs), "a command is finite");
   is_finished_ = false;
   return command_;
+}
+
+/// Whether a plan neither moves nor turns a vehicle that looks the other way.
+bool Controller::faces_away() const noexcept {
+  const Roles& roles = vehicle_->description().roles;
+  if (roles.heading < 0 || !(std::abs(command_.heading_error) > 0.5 * std::numbers::pi)) return false;
+  const int N = problem_.intervals();
+  const double *from = point_.state(0), *to = point_.state(N);
+  const double way =
+      std::hypot(to[roles.position_x] - from[roles.position_x], to[roles.position_y] - from[roles.position_y]);
+  const double wanted = arc_lengths_[static_cast<std::size_t>(N)] - arc_lengths_[0];
+  return way < standing_share * wanted && std::abs(to[roles.heading] - from[roles.heading]) < standing_turn;
 }
 
 /// Work that the robot need not wait for: assess and keep the plan before the problem changes to the next sample.
@@ -486,9 +506,28 @@ void Controller::finish() noexcept {
   if (is_finished_) return;
   is_finished_ = true;
   solver_->finish(point_, command_.report);
+  measure_violations();
   if (!has_plan_) return;
   shifter_.take(problem_, point_);
   if (!command_.fallback) has_plan_ = is_finite(problem_, point_);
+}
+
+/// Of the limits that the vehicle meets next, whose data are still those of the last sample.
+void Controller::measure_violations() noexcept {
+  if (command_.violations.empty()) return;
+  std::fill(command_.violations.begin(), command_.violations.end(), 0.0);
+  problem_.evaluate_limits(point_, limit_values_.data(), scratch_);
+  const HorizonTerms& terms = problem_.terms();
+  for (int i = 0; i <= 1; ++i) {
+    const TermFunctions::Rows* rows = terms.rows(i, problem_.intervals(), true);
+    const double* values = limit_values_.data() + static_cast<std::ptrdiff_t>(i) * problem_.capacity().limit_row();
+    for (int r = 0; rows && r < rows->limits; ++r) {
+      const int limit = rows->first_limit + r;
+      const double beyond = std::max(terms.lower(i)[limit] - values[r], values[r] - terms.upper(i)[limit]);
+      double& most = command_.violations[static_cast<std::size_t>(limit)];
+      most = std::max(most, beyond);
+    }
+  }
 }
 
 void Controller::prepare() noexcept {

@@ -71,8 +71,12 @@ void HorizonTerms::place(int node, const TermPlace& place) noexcept {
     functions_->terms()[t].term->write_data(place, data(node) + functions_->first_data_of(t), own_lower_.data(),
                                             own_upper_.data());
     for (int k = 0; k < functions_->limits_of(t); ++k) {
-      lower(node)[functions_->place_of(t, k)] = own_lower_[static_cast<std::size_t>(k)];
-      upper(node)[functions_->place_of(t, k)] = own_upper_[static_cast<std::size_t>(k)];
+      const int limit = functions_->place_of(t, k);
+      double least = own_lower_[static_cast<std::size_t>(k)], most = own_upper_[static_cast<std::size_t>(k)];
+      // A soft limit that has no room keeps to the middle: a row has one violation, which a sum of two would not be.
+      if (least > most && functions_->linear()[limit] < infinity) least = most = 0.5 * (least + most);
+      lower(node)[limit] = least;
+      upper(node)[limit] = most;
     }
   }
 }

@@ -2,9 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <string>
 #include <utility>
+#include <vector>
 
+#include "rhec/core/model/step_requirement.hpp"
 #include "rhec/plugins/robot/bounds_section.hpp"
+#include "rhec/plugins/robot/integration.hpp"
 #include "rhec/plugins/robot/sensors.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
 
@@ -20,6 +24,22 @@ std::shared_ptr<const RobotContext> context_of(const Host& host, const RobotOpti
 }
 
 constexpr double longest_usual_step = 1.0;  // [s]
+
+/// Says that explicit steps cost much in these sections ("estimator, controller"); empty if they do not.
+std::string costly_steps_note(const RobotContext& context, const std::string& sections) {
+  const Model& model = *context.model;
+  if (sections.empty() || !model.graph()) return {};
+  std::vector<double> parameters;
+  for (const Variable& parameter : context.about.parameters) parameters.push_back(middle_value(parameter));
+  const StepRequirement needed =
+      step_requirement(model, operating_points(model, context.about, parameters), context.step);
+  if (needed.mode_substeps <= most_explicit_substeps || needed.state < 0) return {};
+  return fmt::format(
+      "{}: an interval of {:g} s takes {} Runge-Kutta steps, since the model '{}' has a time constant of {:.3g} s, in "
+      "the state '{}'; a solve takes many times as long as with integrator: implicit, which follows it in a few steps",
+      sections, context.step, needed.mode_substeps, context.about.name, needed.time_constant,
+      context.about.states[static_cast<std::size_t>(needed.state)].name);
+}
 
 }  // namespace
 
@@ -70,6 +90,12 @@ std::vector<std::string> Robot::notes() const {
         "step: {} s from node to node is long: what happens between is not seen, and inputs do not change; most robots "
         "take 0.05 to 0.5 s",
         step()));
+  std::string explicit_sections;
+  if (estimator_options().integrator == Integrator::runge_kutta) explicit_sections = "estimator";
+  if (controller_.options().integrator == Integrator::runge_kutta)
+    explicit_sections += explicit_sections.empty() ? "controller" : ", controller";
+  if (std::string note = costly_steps_note(*context_, explicit_sections); !note.empty())
+    notes.push_back(std::move(note));
   return notes;
 }
 

@@ -171,6 +171,9 @@ void bind_commands(py::module_& module) {
           "relaxed", [](const CommandObject& self) { return self.value.relaxed; },
           "a state's bound was out of reach and was relaxed")
       .def_property_readonly(
+          "faces_away", [](const CommandObject& self) { return self.value.faces_away; },
+          "the vehicle faces away from the path, and stands until somebody turns it")
+      .def_property_readonly(
           "pace", [](const CommandObject& self) { return self.value.pace; },
           "share of the path's speeds that is driven at present")
       .def_property_readonly(

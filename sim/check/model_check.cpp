@@ -248,7 +248,7 @@ ModelCheck check_model(Model& model, const ModelCheckOptions& options) {
 ModelCheck check_model(const Host& host, const Robot& robot, ModelCheckOptions options) {
   options.interval = robot.step();
   options.horizon = robot.estimator_options().horizon;
-  options.substeps = robot.substeps();
+  options.substeps = robot.estimator_options().substeps;
   options.output_sigmas = robot.output_sigmas();
   options.input_sigmas = robot.input_sigmas();
   options.blockings = robot.make_blockings();

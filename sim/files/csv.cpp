@@ -11,6 +11,7 @@
 #include <limits>
 #include <optional>
 #include <system_error>
+#include <utility>
 
 #include "rhec/core/base/error.hpp"
 
@@ -81,6 +82,21 @@ bool is_header(std::string_view line, const CsvOptions& options) {
   return any_name && !any_number;
 }
 
+/// What other programs write in the place of a comma, where a field that is no number has it.
+std::string_view foreign_separator(std::string_view field) {
+  field = trimmed(field);
+  for (const auto& [sign, name] : {std::pair{';', "semicolons"}, std::pair{'\t', "tabs"}, std::pair{' ', "blanks"}})
+    if (field.find(sign) != std::string_view::npos) return name;
+  return {};
+}
+
+[[noreturn]] void refuse(std::string_view field, int column, const std::string& name, std::int64_t line) {
+  if (const std::string_view found = foreign_separator(field); !found.empty() && column == 0)
+    throw Error(fmt::format("{}:{}: {} in {}; expected numbers separated by commas", name, line, found, quoted(field)));
+  throw Error(fmt::format("{}:{}: field {} is {}; expected a finite number, or nothing or 'nan' where it is missing",
+                          name, line, column + 1, quoted(field)));
+}
+
 void require_count(int found, int expected, const std::string& name, std::int64_t line) {
   if (found == expected) return;
   throw Error(
@@ -128,11 +144,7 @@ CsvTable parse_csv(std::string_view text, const std::string& name, const CsvOpti
     const std::size_t row_start = table.values.size();
     const int found = for_each_field(line, [&](std::string_view field, int column) {
       const std::optional<double> number = number_in(field);
-      if (!number) {
-        throw Error(
-            fmt::format("{}:{}: field {} is {}; expected a finite number, or nothing or 'nan' where it is missing",
-                        name, line_number, column + 1, quoted(field)));
-      }
+      if (!number) refuse(field, column, name, line_number);
       table.values.push_back(*number);
     });
     if (table.missing.empty()) settle_columns(found);

@@ -85,6 +85,19 @@ void count_inside(const Sample& sample, const ModelDescription& about, std::vect
   }
 }
 
+/// A step of a controller that takes few of them keeps a limit this well, in its unit.
+constexpr double kept = 1e-3;
+
+void take_violations(const Controller& controller, std::map<std::string, LimitRecord>& limits) {
+  const Controller::Command& command = controller.command();
+  const TermFunctions* const terms = controller.problem().terms().functions();
+  for (std::size_t j = 0; j < command.violations.size(); ++j) {
+    LimitRecord& record = limits[terms->limit_names()[j]];
+    record.violated += command.violations[j] > kept;
+    record.most = std::max(record.most, command.violations[j]);
+  }
+}
+
 }  // namespace
 
 RunLog run_closed_loop(const Scenario& scenario, const LoopHooks& hooks) {
@@ -181,7 +194,8 @@ RunLog run_closed_loop(const Scenario& scenario, const LoopHooks& hooks) {
       break;
     }
     if (k >= limit) {
-      log.ended = "the vehicle took more than three times as long as it should have";
+      log.ended = command.faces_away ? "the vehicle stands, facing away from the path"
+                                     : "the vehicle took more than three times as long as it should have";
       break;
     }
     begin(LoopPart::simulate);
@@ -189,6 +203,7 @@ RunLog run_closed_loop(const Scenario& scenario, const LoopHooks& hooks) {
     const std::vector<double>& measured = world.measured_inputs(command.inputs);
     begin(LoopPart::prepare_control);
     controller->prepare();
+    take_violations(*controller, log.limits);
     begin(LoopPart::prepare_estimate);
     estimator->push_input(world.on_robots_clock(time), measured.data());
     if (hooks.moved) hooks.moved(world.on_robots_clock(time), measured.data());
@@ -196,6 +211,7 @@ RunLog run_closed_loop(const Scenario& scenario, const LoopHooks& hooks) {
     begin(LoopPart::simulate);
   }
   controller->finish();
+  take_violations(*controller, log.limits);
   estimator->end_drive();
   const std::vector<Variable>& about_outputs = model.description().outputs;
   for (std::size_t j = 0; j < about_outputs.size(); ++j)
@@ -276,6 +292,7 @@ RunSummary summarise(const RunLog& log, const Scenario& scenario) {
   summary.certainty = certainty_of(summary);
   summary.noise = log.noise;
   summary.counts = log.counts;
+  summary.limits = log.limits;
   summary.estimator_us = spread_of_times(std::move(estimator_us));
   summary.controller_us = spread_of_times(std::move(controller_us));
   return summary;

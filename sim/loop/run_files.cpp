@@ -168,6 +168,11 @@ Json json_of(const RunSummary& summary) {
     for (const auto& [output, learnt] : summary.noise)
       noise[output] = {{"sigma", learnt.sigma}, {"identified", learnt.is_identified}};
   }
+  if (!summary.limits.empty()) {
+    Json& limits = json["limits"] = Json::object();
+    for (const auto& [name, record] : summary.limits)
+      limits[name] = {{"violated", record.violated}, {"most", record.most}};
+  }
   json["within_two_sigma"] = summary.within_two_sigma;
   json["certainty"] = summary.certainty == Certainty::unknown ? Json(nullptr) : Json(name_of(summary.certainty));
   json["solve_time_us"] = {{"rhe", json_of(summary.estimator_us)}, {"rhc", json_of(summary.controller_us)}};

@@ -314,6 +314,7 @@ ScenarioOptions parse_scenario(const Settings& settings) {
 constexpr double quickest_usual = 40.0;     // [m/s]
 constexpr double most_acceleration = 20.0;  // of any ground vehicle, with a wide margin [m/s^2]
 constexpr double most_turn = 1.0;           // in a step [rad]
+constexpr double bends_too_sharp = 1.1;     // times what the vehicle can, for the roundness of waypoints
 constexpr double share_that_counts = 0.1;   // of a path; corners of coarse waypoints are less
 constexpr int most_places_looked_at = 2000;
 
@@ -327,6 +328,47 @@ double exceeded_along(const Path& path, const Number& number) {
   const auto place = numbers.begin() + static_cast<std::ptrdiff_t>((1.0 - share_that_counts) * count);
   std::nth_element(numbers.begin(), place, numbers.end());
   return *place;
+}
+
+/// How sharply a vehicle turns where nothing slips, with one of its states at a bound.
+struct SharpestTurn {
+  double curvature = 0.0;  ///< [1/m]; 0: not known
+  int state = -1;
+};
+
+/// Of vehicles whose heading follows from a bounded state, such as a steering angle: one that an input turns at once,
+/// or that nothing bounds, has none.
+SharpestTurn sharpest_turn(const Model& model, const ModelDescription& about) {
+  const Roles& roles = about.roles;
+  if (roles.heading < 0) return {};
+  const std::vector<double> parameters = nominal_values(about.parameters);
+  std::vector<double> state(about.states.size(), 0.0), inputs(about.inputs.size(), 0.0), rates(about.states.size());
+  model.straight_motion(1.0, parameters.data(), state.data(), inputs.data());
+  const auto curvature = [&] {
+    model.rates(state.data(), inputs.data(), parameters.data(), rates.data());
+    const double speed = std::hypot(rates[roles.position_x], rates[roles.position_y]);
+    return std::abs(rates[roles.heading]) / speed;
+  };
+  for (double& input : inputs) {
+    const double before = input;
+    input += 1e-3;
+    const bool turns = curvature() > 0.0;
+    input = before;
+    if (turns) return {};
+  }
+  SharpestTurn sharpest;
+  for (std::size_t j = 0; j < about.states.size(); ++j) {
+    const Variable& variable = about.states[j];
+    if (!std::isfinite(variable.lower) || !std::isfinite(variable.upper)) continue;
+    const double before = state[j];
+    for (const double bound : {variable.lower, variable.upper}) {
+      state[j] = bound;
+      if (const double bend = curvature(); std::isfinite(bend) && bend > sharpest.curvature)
+        sharpest = {bend, static_cast<int>(j)};
+    }
+    state[j] = before;
+  }
+  return sharpest;
 }
 
 }  // namespace
@@ -428,6 +470,14 @@ std::vector<std::string> Scenario::notes() const {
         "step: in {} s the path turns by {:.2g} rad, which inputs that are constant for so long cannot follow; take a "
         "shorter step",
         robot_.step(), turn));
+  const ModelDescription& about = robot_.bounded_description();
+  const double bend = exceeded_along(path_, [](const PathPoint& point) { return std::abs(point.curvature); });
+  if (const SharpestTurn most = sharpest_turn(*robot_.model(), about);
+      most.state >= 0 && bend > bends_too_sharp * most.curvature)
+    notes.push_back(
+        fmt::format("path: it has bends of a radius of {:.3g} m; with '{}' at its bound the vehicle turns on {:.3g} m "
+                    "where nothing slips, and leaves the path there",
+                    1.0 / bend, about.states[static_cast<std::size_t>(most.state)].name, 1.0 / most.curvature));
   return notes;
 }
 

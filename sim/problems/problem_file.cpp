@@ -9,9 +9,18 @@
 #include <utility>
 
 #include "format_parts.hpp"
+#include "rhec/core/model/step_requirement.hpp"
 
 namespace rhec::sim {
 namespace {
+
+/// Whether a number that JSON does not have, as other writers put it, begins about there.
+bool is_not_finite_at(std::string_view text, std::size_t column) {
+  const std::string_view there = text.substr(std::min(text.size(), column > 1 ? column - 2 : 0), 4);
+  for (const std::string_view word : {"NaN", "nan", "Inf", "inf"})
+    if (there.find(word) != std::string_view::npos) return true;
+  return false;
+}
 
 Json parse(std::string_view text, const std::string& where) {
   try {
@@ -23,6 +32,11 @@ Json parse(std::string_view text, const std::string& where) {
       throw Error(fmt::format("{}: {}; expected one problem, {{...}}, on each line", where, mistake.what()));
     if (mistake.cause == JsonParseError::Cause::large_number)
       throw Error(fmt::format("{}: a number is too large; expected finite numbers", where));
+    if (is_not_finite_at(text, mistake.byte))
+      throw Error(
+          fmt::format("{}: column {}: a number that is not finite, which JSON does not have; expected null where "
+                      "a measurement or a bound is missing",
+                      where, mistake.byte));
     throw Error(
         fmt::format("{}: column {}: no JSON; expected one problem, {{...}}, on each line", where, mistake.byte));
   }
@@ -69,6 +83,8 @@ void read_horizon(const LineValue& horizon, const ProblemFormat& format, Problem
     throw horizon["integrator"].mismatch(
         fmt::format("\"{}\"; \"{}\" is for lines with \"version\": 4", explicit_name, implicit_name));
   record.substeps = horizon["substeps"].integer(1);
+  if (record.substeps > StepRequirement::most_substeps)
+    throw horizon["substeps"].mismatch(fmt::format("at most {}", StepRequirement::most_substeps));
 }
 
 /// One side of a pair of bounds, for every interval.

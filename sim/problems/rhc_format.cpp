@@ -126,8 +126,16 @@ void fill_terms(const ProblemRecord& record, RhcProblem& problem) {
       check("upper", term.upper[node], limits);
       std::copy_n(term.data[node].begin(), numbers, problem.terms().data(i) + functions.first_data_of(t));
       for (int k = 0; k < functions.limits_of(t); ++k) {
-        problem.terms().lower(i)[functions.place_of(t, k)] = term.lower[node][static_cast<std::size_t>(k)];
-        problem.terms().upper(i)[functions.place_of(t, k)] = term.upper[node][static_cast<std::size_t>(k)];
+        const int limit = functions.place_of(t, k);
+        const double least = term.lower[node][static_cast<std::size_t>(k)],
+                     most = term.upper[node][static_cast<std::size_t>(k)];
+        if (least > most && functions.linear()[limit] < infinity)
+          throw Error(at_key(record.where, fmt::format("terms[{}].lower[{}][{}]", t, i, k),
+                             fmt::format("found {:g}, expected at most the upper bound {:g}: a soft limit is not "
+                                         "violated on both sides at once",
+                                         least, most)));
+        problem.terms().lower(i)[limit] = least;
+        problem.terms().upper(i)[limit] = most;
       }
     }
   }

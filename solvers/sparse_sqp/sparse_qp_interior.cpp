@@ -293,7 +293,8 @@ void SparseQp::finish_interior(const Data& qp, bool relaxed) {
         limit_rows_.set(pair.index, pair.kind == Pair::Kind::lack ? State::below : State::above);
     }
     const ActiveSet found = solve_active(qp, polishing_rounds);
-    if (found == ActiveSet::optimal || found == ActiveSet::feasible) return;
+    // One that is far from settled has multipliers of the wrong sign, which these here have not.
+    if (found == ActiveSet::optimal) return;
     d_ = d;
     lambda_ = lambda;
   }

@@ -81,6 +81,8 @@ const char* in_words(Driving driving) noexcept {
       return "at the end of the path";
     case Driving::estimating:
       return "estimates, does not steer";
+    case Driving::facing_away:
+      return "stands: the path leads away behind the vehicle; turn it, or begin the path with a turn";
     case Driving::driving:
       break;
   }
@@ -391,6 +393,8 @@ void Loop::cycle() {
     if (controller_->finished()) {
       driving = Driving::finished;
       command = nullptr;
+    } else if (command->faces_away) {
+      driving = Driving::facing_away;
     }
   }
   const Clock::time_point controlled = Clock::now();

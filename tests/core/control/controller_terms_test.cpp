@@ -148,6 +148,63 @@ TEST(ControllerTerms, DoNotAllocateInTheLoop) {
   EXPECT_EQ(allocation_count(), before);
 }
 
+/// Of the last command, by the name of the limit.
+double violation(const Drive& drive, const std::string& name) {
+  const std::vector<std::string>& names = drive.controller->problem().terms().functions()->limit_names();
+  const auto found = std::ranges::find(names, name);
+  return found == names.end() ? NAN : drive.controller->command().violations[found - names.begin()];
+}
+
+TEST(ControllerTerms, SayByHowMuchTheyAreViolatedNext) {
+  Drive drive("terms: [{name: corridor, left: 3, right: 3}, {name: obstacles, most: 1, soft: {linear: 0.1}}]");
+  drive.advance();
+  EXPECT_LT(violation(drive, "corridor: lateral"), 1e-6);
+  EXPECT_LT(violation(drive, "obstacles: obstacle 1"), 1e-6);
+  // It appears at once, right before the vehicle, and costs too little to stop for.
+  const Obstacle seen{.x = drive.now.state[0] + 0.6, .y = 0.0, .semi_axis_along = 0.5, .semi_axis_across = 0.5};
+  drive.controller->set_obstacles({&seen, 1}, drive.now.time);
+  drive.advance();
+  EXPECT_LT(violation(drive, "corridor: lateral"), 1e-6);
+  const double told = violation(drive, "obstacles: obstacle 1");
+  EXPECT_GT(told, 0.2);
+  // The radius of the vehicle and of the obstacle, and what is rounded off of the distance near the centre.
+  EXPECT_NEAR(told, 1.0 - drive.distance(seen.x, seen.y), 0.3);
+  drive.controller->set_obstacles({}, drive.now.time);
+  drive.advance();
+  EXPECT_LT(violation(drive, "obstacles: obstacle 1"), 1e-6) << "not that of the sample before";
+  const long before = allocation_count();
+  drive.controller->control(drive.now);
+  drive.controller->finish();
+  EXPECT_EQ(allocation_count(), before);
+}
+
+TEST(ControllerTerms, ThatAreSoftKeepToTheMiddleWhereThereIsNoRoom) {
+  for (const bool hard : {false, true}) {
+    const Robot robot(host(), RobotOptions::table().parse(
+                                  parse_yaml(std::string("{model: bicycle_slip, step: 0.2, controller: {terms: [{name: "
+                                                         "corridor, margin: 0.5, hard: ") +
+                                                 (hard ? "true" : "false") + "}]" + sparse + "}}",
+                                             "test"),
+                                  "robot"));
+    const auto controller = robot.make_controller(Path({{0.0, 0.0, 2.0, 0.6, 0.2}, {60.0, 0.0, 2.0, 0.6, 0.2}}));
+    Estimate now;
+    now.state = Eigen::Vector4d(0.0, 0.0, 0.0, 0.0);
+    now.parameters = Eigen::Vector2d(0.9, 0.9);
+    const Controller::Command& command = controller->control(now);
+    controller->finish();
+    const HorizonTerms& terms = controller->problem().terms();
+    if (hard) {
+      EXPECT_TRUE(command.fallback) << "it is never violated, so that there is no plan";
+      EXPECT_EQ(command.report.status, Status::infeasible);
+      continue;
+    }
+    EXPECT_FALSE(command.fallback);
+    EXPECT_NEAR(terms.lower(5)[0], 0.2, 1e-12);
+    EXPECT_NEAR(terms.upper(5)[0], 0.2, 1e-12);
+    EXPECT_NEAR(controller->plan().state(15)[1], 0.2, 0.01);
+  }
+}
+
 TEST(ControllerTerms, AreReadOneByOneAndRefusedInWords) {
   const auto refused = [](const std::string& section) { return error_of([&] { Drive drive(section); }); };
   EXPECT_THAT(refused("terms: {name: corridor}"), HasSubstr("controller.terms: found a map, expected a list of terms"));

@@ -209,6 +209,65 @@ TEST(ControllerReference, StartsWhereTheVehicleIs) {
   EXPECT_NEAR(controller->control(estimate_at(*controller, 80.0, 0.0, 0.0)).reference.x, 80.0, 1e-9);
 }
 
+/// Follows the diagonal for so many samples from its tenth metre, looking off the path by an angle, without slip.
+struct Turned {
+  bool ever = false, now = false;  ///< facing away, by what the commands say
+  double way = 0.0;                ///< along the path [m]
+};
+Turned turned(const std::string& configuration, double angle, int samples) {
+  const auto controller = controller_for(configuration);
+  const Model& model = controller->problem().model();
+  const std::vector<double> slip = nominal_values(model.description().parameters);
+  const Roles& roles = model.description().roles;
+  Estimate estimate;
+  estimate.state = Eigen::VectorXd::Zero(model.state_count());
+  const double start = 10.0 / std::numbers::sqrt2, step = 0.2;
+  roles.place(start, start, 0.25 * std::numbers::pi + angle, estimate.state.data());
+  estimate.parameters = Eigen::Map<const Eigen::VectorXd>(slip.data(), static_cast<Eigen::Index>(slip.size()));
+  Turned told;
+  for (int k = 0; k < samples; ++k) {
+    const Controller::Command& command = controller->control(estimate);
+    told.now = command.faces_away;
+    told.ever |= told.now;
+    Eigen::VectorXd next(model.state_count());
+    model.integrate({.count = 1,
+                     .states = estimate.state.data(),
+                     .inputs = command.inputs.data(),
+                     .parameters = slip.data(),
+                     .durations = &step,
+                     .next_states = next.data()});
+    estimate.state = next;
+    estimate.time += step;
+    controller->prepare();
+  }
+  told.way = (estimate.state[roles.position_x] + estimate.state[roles.position_y]) / std::numbers::sqrt2 - 10.0;
+  return told;
+}
+
+TEST(ControllerHeading, ThatIsAwayFromThePathIsTold) {
+  const char* const bicycle = "model: bicycle_slip";
+  for (const double angle : {std::numbers::pi, 3.0, -2.8}) {
+    const Turned away = turned(bicycle, angle, 50);
+    EXPECT_TRUE(away.now) << angle;
+    EXPECT_LT(std::abs(away.way), 0.5) << angle << ": it stands";
+  }
+  for (const double angle : {0.0, 1.0, -1.8}) {
+    const Turned about = turned(bicycle, angle, 100);
+    EXPECT_FALSE(about.ever) << angle << ": it turns round by itself";
+    EXPECT_GT(about.way, 20.0) << angle;
+  }
+  // In reverse the vehicle looks the other way, as it should.
+  const Robot robot(host(), RobotOptions::table().parse(parse_yaml(bicycle, "robot.yaml"), "robot"));
+  const auto reverse = robot.make_controller(Path({{0.0, 0.0, -1.0}, {20.0, 0.0, -1.0}}));
+  Estimate estimate;
+  estimate.state = Eigen::Vector4d(0.0, 0.0, std::numbers::pi, 0.0);
+  estimate.parameters = Eigen::Vector2d(1.0, 1.0);
+  EXPECT_FALSE(reverse->control(estimate).faces_away);
+  estimate.state[2] = 0.0;
+  reverse->locate();
+  EXPECT_TRUE(reverse->control(estimate).faces_away);
+}
+
 TEST(ControllerReference, RefusesAPathThatNoVehicleCanFollow) {
   EXPECT_THAT(error_of([] {
                 controller_on(Path({{0, 0, 1.0}, {5, 0, 1.0}, {0, 0.1, 1.0}}));

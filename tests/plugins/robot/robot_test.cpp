@@ -61,6 +61,37 @@ smoother: {deadline: 3})");
   EXPECT_EQ(made.make_controller(path())->problem().setup().max_intervals, 9);
 }
 
+/// A vehicle whose motor follows with a lag of 1 ms.
+Robot with_fast_motor(const std::string& integrators) {
+  return robot(R"(
+model:
+  equations:
+    name: motor
+    states: {x: {role: position_x}, y: {role: position_y}, psi: {role: heading, angle: true}, v: {unit: m/s}}
+    inputs: {wanted: {unit: m/s, role: speed}, turn: {unit: rad/s}}
+    outputs: {x: {}, y: {}}
+    equations: |
+      x' = v * cos(psi)
+      y' = v * sin(psi)
+      psi' = turn
+      v' = (wanted - v) / 0.001
+)" + integrators);
+}
+
+TEST(Robot, NotesExplicitStepsThatCostMuch) {
+  EXPECT_THAT(with_fast_motor("").notes(),
+              ElementsAre(testing::AllOf(StartsWith("estimator, controller: an interval of 0.2 s takes 7"),
+                                         HasSubstr("'motor' has a time constant of 0.001 s, in the state 'v'"),
+                                         HasSubstr("integrator: implicit"))));
+  EXPECT_THAT(with_fast_motor("estimator: {integrator: implicit}").notes(),
+              ElementsAre(StartsWith("controller: an interval")));
+  EXPECT_THAT(with_fast_motor("controller: {integrator: auto}").notes(), ElementsAre(StartsWith("estimator: ")));
+  EXPECT_THAT(with_fast_motor("estimator: {integrator: implicit}\ncontroller: {integrator: implicit}").notes(),
+              testing::IsEmpty())
+      << "the remedy works";
+  EXPECT_THAT(robot("").notes(), testing::IsEmpty());
+}
+
 TEST(Robot, NamesThePlaceOfAMistakeInAnySection) {
   for (const char* wrong :
        {"modl: bicycle_slip", "model: bicycle_slp", "noise: {output: {}}", "bounds: {kapa: [0, 1]}",

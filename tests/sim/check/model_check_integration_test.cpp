@@ -2,8 +2,12 @@
 #include <gtest/gtest.h>
 
 #include <memory>
+#include <string>
 
 #include "rhec/core/model/formula_model.hpp"
+#include "rhec/plugins/host/host.hpp"
+#include "rhec/plugins/robot/robot.hpp"
+#include "rhec/plugins/yaml/yaml.hpp"
 #include "sim/support/unicycle.hpp"
 
 namespace rhec::sim {
@@ -71,6 +75,33 @@ TEST(Integration, OfWhatNoStepsFollowFails) {
   const Finding finding = found(1e-5);
   EXPECT_EQ(finding.verdict, Verdict::fail);
   EXPECT_THAT(finding.found, HasSubstr("1000 Runge-Kutta steps do not follow an interval of 0.2 s"));
+}
+
+// Of a robot whose steps are chosen for it, what is said is not that other steps be chosen for it.
+TEST(Integration, OfARobotThatChoosesItsStepsAsksForNoOtherNumber) {
+  const auto advice = [](const std::string& substeps) {
+    const Robot robot(Host(), RobotOptions::table().parse(parse_yaml(R"(
+model:
+  equations:
+    name: motor
+    states: {x: {role: position_x}, y: {role: position_y}, psi: {role: heading, angle: true}, v: {unit: m/s}}
+    inputs: {wanted: {unit: m/s, role: speed}, turn: {unit: rad/s}}
+    outputs: {x: {}, y: {}}
+    equations: |
+      x' = v * cos(psi)
+      y' = v * sin(psi)
+      psi' = turn
+      v' = (wanted - v) / 0.001
+estimator: )" + substeps,
+                                                                     "robot.yaml"),
+                                                          "robot"));
+    const ModelCheck check = check_model(Host(), robot, {.samples = 16});
+    for (const Finding& finding : check.findings)
+      if (finding.check == "integration") return finding.advice;
+    return std::string();
+  };
+  EXPECT_THAT(advice("{}"), testing::AllOf(HasSubstr("integrator: implicit"), testing::Not(HasSubstr("auto"))));
+  EXPECT_THAT(advice("{substeps: 80}"), HasSubstr("or auto"));
 }
 
 }  // namespace model_check_integration_test

@@ -45,6 +45,10 @@ TEST(Csv, NamesFileLineAndWhatWasFound) {
   for (const char* wrong : {"1.5x", "0x10", "inf", "-INF", "1e999", "1 2", "--1", "+-1", "\"1\"", "1;2", "-nan"}) {
     EXPECT_CONTAINS(message_for(std::string("0,0\n0,") + wrong), "log.csv:2: field 2 is");
   }
+  EXPECT_CONTAINS(message_for("x;y\n0;1\n", {.header = CsvHeader::optional}),
+                  "log.csv:2: semicolons in '0;1'; expected numbers separated by commas");
+  EXPECT_CONTAINS(message_for("0\t1\n"), "log.csv:1: tabs in ");
+  EXPECT_CONTAINS(message_for("0 1\n"), "log.csv:1: blanks in ");
   EXPECT_CONTAINS(message_for(""), "empty");
   EXPECT_CONTAINS(error_of([] { read_csv("no/such.csv"); }), "no/such.csv: cannot be read");
   EXPECT_CONTAINS(error_of([] { read_csv(testing::TempDir()); }), "is a folder");

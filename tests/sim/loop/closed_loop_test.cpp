@@ -64,6 +64,26 @@ TEST(SmallRobots, FinishAllLapsOfCirclesThatAreShorterThanTheWindowOfTheirFollow
   }
 }
 
+// An obstacle right before the vehicle that costs too little to stop for is driven through, and that is told.
+TEST(Limits, ThatWereNotKeptAreTold) {
+  const std::string path = "path={name: zigzag, legs: 1, leg_length: 30}";
+  const PathPoint start = scenario_with({path}).path().point_at(0.0);
+  const Scenario scenario = scenario_with(
+      {path, "speed=3", "estimator.name=truth",
+       "controller.terms=[{name: corridor, left: 9, right: 9}, {name: obstacles, soft: {linear: 1}, obstacles: [{x: " +
+           std::to_string(start.x + 2.0 * std::cos(start.heading)) +
+           ", y: " + std::to_string(start.y + 2.0 * std::sin(start.heading)) + ", radius: 1.5}]}]"});
+  const RunSummary summary = summarise(run_closed_loop(scenario), scenario);
+  ASSERT_EQ(summary.limits.size(), 2U);
+  EXPECT_EQ(summary.limits.at("corridor: lateral").violated, 0);
+  const LimitRecord& record = summary.limits.at("obstacles: obstacle 1");
+  EXPECT_GT(record.violated, 0);
+  EXPECT_LT(record.violated, summary.steps / 2);
+  EXPECT_GT(record.most, 0.5) << "m";
+  EXPECT_THAT(summary_json(summary), testing::HasSubstr("\"obstacles: obstacle 1\": {"));
+  EXPECT_TRUE(summarise(run_closed_loop(scenario_with({path})), scenario_with({path})).limits.empty());
+}
+
 TEST(Ends, ARobotThatOnlyTakesItselfToBeAtTheEndIsNotThere) {
   // Dead reckoning, on wheels that slip more than it believes.
   Settings settings = parse_yaml(R"(

@@ -52,6 +52,20 @@ TEST(Scenario, NotesWhatLooksLikeAWrongUnit) {
               testing::ElementsAre(HasSubstr("noise.outputs.delta: passed over")));
 }
 
+TEST(Scenario, NotesBendsThatTheVehicleCannotTake) {
+  EXPECT_THAT(figure8_with({"path.radius=1.5", "speed=1"}).notes(),
+              testing::ElementsAre(testing::AllOf(HasSubstr("bends of a radius of 1.5 m"), HasSubstr("with 'delta'"),
+                                                  HasSubstr("turns on 2 m"))));
+  EXPECT_THAT(figure8_with({"path.radius=2.1", "speed=1"}).notes(), testing::IsEmpty());
+  EXPECT_THAT(figure8_with({"path.radius=2.1", "speed=1", "bounds.delta=[-0.2, 0.2]"}).notes(),
+              testing::ElementsAre(HasSubstr("turns on 6.9")));
+  // One that an input turns can turn on the spot.
+  EXPECT_THAT(figure8_with({"path={name: figure8, radius: 0.3, spacing: 0.02}", "speed=0.2", "model={name: skid_steer}",
+                            "noise={}", "bounds={}", "estimator={}", "controller={}"})
+                  .notes(),
+              testing::IsEmpty());
+}
+
 TEST(Scenario, ThoseThatComeWithRhecHaveNothingToNote) {
   int count = 0;
   for (const auto& entry : std::filesystem::directory_iterator(SCENARIOS)) {

@@ -122,6 +122,16 @@ TEST(RhcFormat, StoresTermsWithTheirOptionsAndData) {
   EXPECT_THAT(wrong("\"name\":\"effort\"", "\"name\":\"efort\""), ::testing::HasSubstr("set.jsonl:3: terms[2]: "));
   EXPECT_THAT(wrong("\"most\":2", "\"most\":3"),
               ::testing::HasSubstr("terms[1].data[0]: 14 numbers, expected 21 for the term 'obstacles'"));
+  EXPECT_EQ(wrong("\"lower\":[[-", "\"lower\":[[1"), "") << "a hard one; the solver says that it is infeasible";
+  const auto soft = [&](const char* lower) {
+    std::vector<ProblemRecord> record{read_problem(
+        replaced(replaced(line, "\"hard\":true", "\"hard\":false"), "\"lower\":[[-", lower), "set.jsonl", 3)};
+    make_terms(record, host);
+    build(record[0], model);
+  };
+  EXPECT_EQ(error_of([&] { soft("\"lower\":[[-"); }), "");
+  EXPECT_THAT(error_of([&] { soft("\"lower\":[[1"); }),
+              ::testing::HasSubstr("set.jsonl:3: terms[0].lower[0][0]: found 13, expected at most the upper bound 3"));
 }
 
 TEST(RhcFormat, RefillsInPlaceWhatFits) {

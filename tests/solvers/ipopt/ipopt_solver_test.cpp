@@ -250,5 +250,37 @@ TEST(Ipopt, TellsInfeasibleFromTooFewIterations) {
   EXPECT_EQ(status(0.1, -0.1, 500), Status::solved);
 }
 
+// Limits that meet in one point leave an interior-point method no interior: multipliers grow without bound there, and
+// the residual that is relative to them becomes small far from the optimum.
+TEST(Ipopt, LimitsWithoutInteriorAreNotLeftTooEarly) {
+  int compared = 0;
+  for (unsigned seed = 700; seed < 740; ++seed) {
+    RandomProblem random(bicycle(), seed);
+    RandomProblem::RhcSpec spec;
+    spec.intervals = 4;
+    spec.off = 0.3;
+    const auto problem = random.rhc(spec);
+    const Iterate start = RandomProblem::cold_start(*problem);
+    LimitedOcp limited(*problem, 3);
+    // Where the start is at node 2, one position is met from below and from above, by rows that are no equation.
+    const double x = start.state(2)[0], y = start.state(2)[1];
+    limited.add(2, {Limit::Kind::linear, {0}, {1.0}, -infinity, x});
+    limited.add(2, {Limit::Kind::linear, {0, 1}, {1.0, 1.0}, x + y, infinity});
+    limited.add(2, {Limit::Kind::linear, {1}, {1.0}, -infinity, y});
+    limited.add(4, {Limit::Kind::linear, {0}, {1.0}, -infinity, start.state(4)[0]});
+    Iterate ours = with_limits(limited, start), theirs = ours;
+    const auto solver = ipopt_with("{}");
+    const auto other = host().make_solver("gn_rti", parse_yaml("{mode: converge}", "options.yaml"));
+    solver->setup(limited);
+    other->setup(limited);
+    const Report report = solver->solve(ours), expected = other->solve(theirs);
+    if (expected.status != Status::solved) continue;
+    ++compared;
+    EXPECT_EQ(report.status, Status::solved) << seed;
+    EXPECT_NEAR(report.objective, expected.objective, 1e-6 * (1.0 + expected.objective)) << seed;
+  }
+  EXPECT_GE(compared, 35);
+}
+
 }  // namespace ipopt_solver_test
 }  // namespace rhec::ipopt

@@ -4,9 +4,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <random>
 #include <string>
 #include <utility>
 #include <vector>
@@ -17,13 +19,17 @@
 #include "rhec/core/qp/riccati.hpp"
 #include "rhec/plugins/host/host.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
+#include "support/limited_ocp.hpp"
 #include "support/random_problem.hpp"
 #include "support/test_models.hpp"
 
 namespace rhec::sparse_sqp {
 namespace sparse_sqp_test {
 
+using rhec::testing::Limit;
+using rhec::testing::LimitedOcp;
 using rhec::testing::RandomProblem;
+using rhec::testing::with_limits;
 using rhec::testing::WithoutSecondDerivatives;
 using Drive = RandomProblem::Drive;
 using RheSpec = RandomProblem::RheSpec;
@@ -428,6 +434,51 @@ TEST(SparseSqp, StructuresThatChangeFromSolveToSolve) {
     point = RandomProblem::cold_start(*problem);
     EXPECT_EQ(solve_and_assess(*solver, *problem, point).status, Status::solved) << k;
   }
+}
+
+// Many rows that depend on each other at each node: which of them pull is not unique, so that the multipliers on an
+// active set may have the wrong sign where those of the interior point have not.
+TEST(SparseSqp, FindsMultipliersOfManyDependentLimits) {
+  int solved = 0;
+  for (unsigned seed = 300; seed < 400; ++seed) {
+    RandomProblem random(bicycle(), seed);
+    RhcSpec spec;
+    spec.intervals = 20;
+    spec.off = 0.2;
+    const auto problem = random.rhc(spec);
+    const Iterate start = RandomProblem::cold_start(*problem);
+    const int inputs_at = problem->capacity().states;
+    LimitedOcp limited(*problem, 4);
+    std::mt19937 generator(seed);
+    std::normal_distribution<double> normal;
+    std::vector<double> rows[3];
+    for (auto& row : rows)
+      for (int j = 0; j < 6; ++j) row.push_back(normal(generator));
+    for (int i = 0; i < spec.intervals; ++i) {
+      // All hold at the start with equality, to either side.
+      double z[6];
+      std::copy_n(start.state(i), 4, z);
+      std::copy_n(start.control(i), 2, z + 4);
+      double first_side = 0.0;
+      for (int k = 0; k < 4; ++k) {
+        Limit limit;
+        limit.of = {0, 1, 2, 3, inputs_at, inputs_at + 1};
+        limit.with = rows[k % 3];
+        double value = 0.0;
+        for (int j = 0; j < 6; ++j) value += limit.with[j] * z[j];
+        const double side = k == 3 ? first_side : normal(generator);
+        if (k == 0) first_side = side;
+        (side > 0.0 ? limit.upper : limit.lower) = value;
+        limited.add(i, limit);
+      }
+    }
+    const auto solver = plugin();
+    solver->setup(limited);
+    Iterate point = with_limits(limited, start);
+    const Report report = solver->solve(point);
+    solved += report.status == Status::solved && report.iterations < 60;
+  }
+  EXPECT_GE(solved, 98);  // of 100
 }
 
 }  // namespace sparse_sqp_test

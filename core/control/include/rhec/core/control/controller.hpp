@@ -76,11 +76,17 @@ class RHEC_EXPORT Controller {
     double heading_error = 0.0;  ///< heading of the estimate - that of the reference, in (-pi, pi] [rad]
     bool relaxed = false;        ///< a state bound was out of reach from the estimate and was relaxed
     double pace = 1.0;           ///< share of the path's speeds that is driven at present
+    /// The vehicle faces away from the path, and its plan is to stand: no way round is worth it within the horizon, so
+    /// that it stays there until somebody turns it, or the path is another.
+    bool faces_away = false;
+    /// By limit of the terms (TermFunctions::limit_names), how far what follows next is beyond it: the plan's first
+    /// interval and the node at its end; 0: it is kept. Of this sample from `finish` on.
+    std::vector<double> violations;
   };
   /// The input for an estimate. Valid until the next call.
   const Command& control(const Estimate& estimate, Clock::time_point deadline = Clock::time_point::max()) noexcept;
-  /// Completes the last command's report with the objective and the KKT residual of its plan. `prepare` and the next
-  /// `control` do that too; only the last command of a run needs this call.
+  /// Completes the last command's report with the objective and the KKT residual of its plan, and its violations.
+  /// `prepare` and the next `control` do that too; only the last command of a run needs this call.
   void finish() noexcept;
   /// Says which inputs (n_u) the vehicle has had until now, where they are not the last command: at the start, or after
   /// it was driven by hand. Matters to rates alone. NaN: the last command, or what drives straight ahead.
@@ -100,6 +106,7 @@ class RHEC_EXPORT Controller {
   const Path& path() const noexcept { return path_; }
   const RhcProblem& problem() const noexcept { return problem_; }
   const Iterate& plan() const noexcept { return point_; }
+  const Command& command() const noexcept { return command_; }  ///< the last one
   /// The vehicle itself; the problem's model has further states if there are rates.
   const Model& vehicle() const noexcept { return *vehicle_; }
   // The vehicle's inputs (n_u) in the plan and its reference on an interval, and the bounds of one.
@@ -123,6 +130,8 @@ class RHEC_EXPORT Controller {
   void start_cold() noexcept;
   void keep_within_bounds() noexcept;
   bool find_plan(Clock::time_point deadline) noexcept;
+  void measure_violations() noexcept;
+  bool faces_away() const noexcept;
 
   Setup setup_;
   std::shared_ptr<const Model> vehicle_;
@@ -143,7 +152,7 @@ class RHEC_EXPORT Controller {
   std::vector<PathPoint> points_;    ///< N_c + 1: the reference
   std::vector<double> arc_lengths_;  ///< of these [m]
   std::int64_t fallbacks_ = 0;
-  std::vector<double> scratch_, straight_, slipless_, largest_, smallest_;
+  std::vector<double> scratch_, straight_, slipless_, largest_, smallest_, limit_values_;
   std::vector<double> nominal_parameters_, reference_parameters_, ahead_parameters_;
   std::vector<double> last_inputs_;   ///< n_u, applied last; NaN: not known
   std::vector<std::uint8_t> drives_;  ///< n_u: whether an input moves the vehicle when it drives straight ahead

@@ -34,13 +34,20 @@ struct Sample {
   double estimator_feedback_us = 0.0;  ///< of this, the time after the measurement [us]
 };
 
+/// How a limit of the controller's terms was kept: by what the plans said of the sample that followed.
+struct LimitRecord {
+  std::int64_t violated = 0;  ///< samples in which it was not, by more than rounding and a step's tolerance
+  double most = 0.0;          ///< by how much at most, in the limit's unit
+};
+
 struct RunLog {
   std::vector<Sample> samples;
   bool completed = false;  ///< the end of the path was reached
   std::string ended = {};  ///< why the run ended
   /// By output, what the estimator has learnt of its noise at the end; empty for one that does not adapt.
   std::map<std::string, EstimationMethod::OutputNoise> noise = {};
-  Estimator::Counts counts = {};  ///< of the estimator
+  Estimator::Counts counts = {};                   ///< of the estimator
+  std::map<std::string, LimitRecord> limits = {};  ///< of the controller's terms, by name
 };
 
 /// Runs estimator -> controller -> ground truth until the path ends, the vehicle is lost, or the run takes far too
@@ -74,6 +81,7 @@ struct RunSummary {
   std::int64_t fallbacks = 0;  ///< solves with unusable results
   std::int64_t solves = 0;
   Estimator::Counts counts;                    ///< of the estimator
+  std::map<std::string, LimitRecord> limits;   ///< as in RunLog
   std::map<std::string, std::int64_t> health;  ///< samples by the level of the estimate's health
 };
 /// From where on a covariance is called wrong: mean NEES in units of its expected value, and the share of samples
