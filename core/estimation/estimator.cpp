@@ -456,7 +456,7 @@ const Estimate& Estimator::estimate(double time, Clock::time_point deadline) noe
                                        std::chrono::duration<double>(share * timeline_.grace)));
   };
   // What follows the nodes takes its time, too.
-  const Clock::duration left = has_deadline ? std::max(deadline - begin, Clock::duration::zero()) : Clock::duration{};
+  const Clock::duration left = has_deadline && deadline > begin ? deadline - begin : Clock::duration::zero();
   const Clock::time_point before_solving = deadline - std::min(solving_, left / 2);
   if (watch_) {
     watch_->begin_innovations();

@@ -20,7 +20,8 @@ RHEC_ALWAYS_INLINE inline void each_constant(const Function& function, Constants
 /// `is_written_out`, loops are unrolled.
 template <int eights, int state_count, int control_count, bool is_written_out = true, int carried_count = 0,
           int known_stride = 0>
-struct Shape {
+struct CompiledShape {
+  static constexpr int known_states = state_count, known_controls = control_count, known_carried = carried_count;
   static constexpr bool is_known = state_count > 0;
   static constexpr bool has_pair = is_known && control_count == 2;
   static constexpr int most_columns = eights * 8;
@@ -35,12 +36,12 @@ struct Shape {
   int states, next_states, offset, columns;
   int moved;  ///< number of next states that are not merely carried; the other rows of AB are rows of the identity
 
-  Shape(const RiccatiView& view, int i)
+  CompiledShape(const RiccatiView& view, int i)
       : states(is_known ? state_count : view.state_counts[i]),
         next_states(is_known ? state_count : view.state_counts[i + 1]),
         offset(is_known ? state_count : view.states),
         columns(offset + (is_known ? control_count : view.control_counts[i])),
-        moved(next_states - (is_known ? carried_count : view.identity_counts[i])) {}
+        moved(next_states - (is_known && !has_checks ? carried_count : view.identity_counts[i])) {}
 
   static long stride_of(const RiccatiView& view) { return known_stride > 0 ? known_stride : view.stride; }
   /// Allocated numbers of states and controls.
@@ -50,7 +51,7 @@ struct Shape {
   }
 
   /// A shape with this many states and no controls.
-  explicit Shape(int count)
+  explicit CompiledShape(int count)
       : states(is_known ? state_count : count), next_states(states), offset(states), columns(states), moved(states) {}
 
   template <class Function>
@@ -100,6 +101,14 @@ struct Shape {
       for (int k = first; k < end; ++k) function(k);
   }
 };
+
+/// The shape that the compiler gets. For unrolled ones with checks it takes minutes for each instruction set: there,
+/// loops remain, and the numbers of carried states and the stride are read from the QP. Sources, indices and memory are
+/// the same.
+template <int eights, int state_count, int control_count, bool is_written_out = true, int carried_count = 0,
+          int known_stride = 0>
+using Shape = CompiledShape<eights, state_count, control_count, is_written_out && !has_checks,
+                            has_checks ? 0 : carried_count, has_checks ? 0 : known_stride>;
 
 inline double bound_of(const RiccatiView& view, int i, int k) {
   const long at = static_cast<long>(i) * view.stride + k;
@@ -298,6 +307,20 @@ RHEC_ALWAYS_INLINE inline void reflect_pair(const RiccatiView& view, const Memor
   *view.is_reflected = true;
 }
 
+/// Stores the Hessian of the stage's value function, and what the dynamics' offsets add to the gradient of the next
+/// one's.
+template <class Stage>
+RHEC_ALWAYS_INLINE inline void store_value(const RiccatiView& view, const Stage& stage, const Memory<Stage>& at,
+                                           const typename Stage::R* X) {
+  using R = typename Stage::R;
+  stage.each_state([&](auto j) RHEC_ALWAYS_INLINE { X[j].first(stage.states).to(at.P + j * at.stride); });
+  if (view.for_steps) {
+    R drift{};
+    stage.each_next_state([&](auto l) RHEC_ALWAYS_INLINE { drift.add(at.row(at.P_next, l), at.b[l]); });
+    drift.to(at.drift);
+  }
+}
+
 template <class Stage>
 RHEC_ALWAYS_INLINE inline bool factor_stage(const RiccatiView& view, int i, double tolerance) {
   using R = typename Stage::R;
@@ -318,12 +341,7 @@ RHEC_ALWAYS_INLINE inline bool factor_stage(const RiccatiView& view, int i, doub
   };
   if (!eliminate()) return false;
   stage.each_control([&](auto k) RHEC_ALWAYS_INLINE { X[k].to(at.V + (k - stage.offset) * at.stride); });
-  stage.each_state([&](auto j) RHEC_ALWAYS_INLINE { X[j].first(stage.states).to(at.P + j * at.stride); });
-  if (view.for_steps) {
-    R drift{};
-    stage.each_next_state([&](auto l) RHEC_ALWAYS_INLINE { drift.add(at.row(at.P_next, l), at.b[l]); });
-    drift.to(at.drift);
-  }
+  store_value(view, stage, at, X);
   if constexpr (Stage::is_compact) close_loop(stage, at, X, view.for_steps);
   return true;
 }
@@ -589,12 +607,7 @@ RHEC_ALWAYS_INLINE inline bool factor_further_stage(const RiccatiView& view, int
     policies[k].add(policy, at.inverse[2 + k]);
     policies[k].to(at.V + (2 + k) * at.stride);
   }
-  stage.each_state([&](auto j) RHEC_ALWAYS_INLINE { X[j].first(stage.states).to(at.P + j * at.stride); });
-  if (view.for_steps) {
-    R drift{};
-    stage.each_next_state([&](auto l) RHEC_ALWAYS_INLINE { drift.add(at.row(at.P_next, l), at.b[l]); });
-    drift.to(at.drift);
-  }
+  store_value(view, stage, at, X);
   return true;
 }
 
@@ -941,29 +954,28 @@ inline bool is_alike(const RiccatiView& view, int i, int j) {
          view.state_counts[j + 1] == view.state_counts[i + 1];
 }
 
+/// Whether stages of six states, two of them carried, that have so many controls beside the first two are factorised as
+/// whole shapes: unrolled in the widest registers, these have fewer dependent operations.
+constexpr bool is_factored_whole(int further) { return matrices_fit && (further == 2 || further == 4); }
+
 /// Calls `function` with the type of the shape that a full stage has with the first two of its controls, and with the
 /// number of the others if that is compiled in (otherwise 0). False if there are no others, or the shape is not one of
 /// the compiled ones.
-template <bool is_written_out, class Function>
+template <class Function>
 inline bool with_further_controls(const RiccatiView& view, int i, const Function& function) {
   const int states = view.states, carried = view.identity_counts[i], further = view.control_counts[i] - 2;
   if (further <= 0 || view.stride != 16 || view.state_counts[i] != states || view.state_counts[i + 1] != states)
     return false;
   if (states == 6 && carried == 2) {
-    // Whole shapes of these, unrolled in the widest registers, have fewer dependent operations.
-    if (is_written_out && (further == 2 || further == 4)) return false;
+    if (is_factored_whole(further)) return false;
     if (further == 1) return function.template operator()<Shape<1, 6, 2, true, 2, 16>, 1>(), true;
     return function.template operator()<Shape<1, 6, 2, true, 2, 16>, 0>(), true;
   }
   if (states == 5 && carried == 2) return function.template operator()<Shape<1, 5, 2, true, 2, 16>, 0>(), true;
-  if (states == 7 && carried == 2)
-    return function.template operator()<Shape<2, 7, 2, is_written_out, 2, 16>, 0>(), true;
-  if (states == 7 && carried == 3)
-    return function.template operator()<Shape<2, 7, 2, is_written_out, 3, 16>, 0>(), true;
-  if (states == 8 && carried == 3)
-    return function.template operator()<Shape<2, 8, 2, is_written_out, 3, 16>, 0>(), true;
-  if (states == 8 && carried == 4)
-    return function.template operator()<Shape<2, 8, 2, is_written_out, 4, 16>, 0>(), true;
+  if (states == 7 && carried == 2) return function.template operator()<Shape<2, 7, 2, matrices_fit, 2, 16>, 0>(), true;
+  if (states == 7 && carried == 3) return function.template operator()<Shape<2, 7, 2, matrices_fit, 3, 16>, 0>(), true;
+  if (states == 8 && carried == 3) return function.template operator()<Shape<2, 8, 2, matrices_fit, 3, 16>, 0>(), true;
+  if (states == 8 && carried == 4) return function.template operator()<Shape<2, 8, 2, matrices_fit, 4, 16>, 0>(), true;
   return false;
 }
 
@@ -971,7 +983,7 @@ int factor(const RiccatiView& view, int first, double tolerance) {
   for (int i = first; i >= 0;) {
     if (view.special[i]) return i;
     bool done = false;
-    const bool has_further = with_further_controls<matrices_fit>(view, i, [&]<class Stage, int further>() {
+    const bool has_further = with_further_controls(view, i, [&]<class Stage, int further>() {
       const int alike = i;
       do
         if (!factor_further_stage<Stage, further>(view, i, tolerance)) return;
@@ -980,7 +992,10 @@ int factor(const RiccatiView& view, int first, double tolerance) {
     });
     if (!has_further)
       done = with_shape<matrices_fit>(view, i, [&]<class Stage>() {
-        if constexpr (!Stage::is_known && Stage::most_columns > 8)
+        // with_further_controls has taken full stages of these shapes.
+        constexpr bool is_taken = Stage::known_states == 6 && Stage::known_carried == 2 && Stage::known_controls > 2 &&
+                                  !is_factored_whole(Stage::known_controls - 2);
+        if constexpr (is_taken || (!Stage::is_known && Stage::most_columns > 8))
           return factor_general(view, i, tolerance) && (--i, true);
         const int alike = i;
         do

@@ -350,6 +350,14 @@ void DualActiveSet::release_column(int k, Weights& weights) noexcept {
   drop_column(k);
 }
 
+/// How far a column's multiplier is out of its range.
+double DualActiveSet::excess_of(int place, double multiplier) const noexcept {
+  if (is_equality_bound(place)) return 0.0;
+  const double size = side_[place] * multiplier;
+  if (!has_limits_ || !is_soft(place)) return -size;
+  return relaxed_[place] != 0 ? linear(place) - size : std::max(-size, size - linear(place));
+}
+
 /// Corrects the column that is most wrong, and the multipliers of the others, until none is: where one was the reason
 /// for others, these stay. Values of all places follow at the end, also of changes that are pending.
 void DualActiveSet::drop_wrong_columns(const Riccati& riccati) noexcept {
@@ -368,11 +376,7 @@ void DualActiveSet::drop_wrong_columns(const Riccati& riccati) noexcept {
     double largest = 0.0;
     for (int k = 0; k < column_count(); ++k) {
       const int place = columns_[k];
-      if (is_equality_bound(place)) continue;
-      const double size = side_[place] * multipliers_[k];
-      double excess = -size;
-      if (has_limits_ && is_soft(place))
-        excess = relaxed_[place] != 0 ? linear(place) - size : std::max(excess, size - linear(place));
+      const double excess = excess_of(place, multipliers_[k]);
       if (excess <= pull_tolerance_) continue;
       const double gain = excess * excess * -sensitivity(place, place);
       if (worst == none || gain > largest) worst = k, largest = gain;
@@ -809,7 +813,7 @@ DualActiveSet::Outcome DualActiveSet::solve(const StageQp& qp, Riccati& riccati,
     } else if (found == Found::step) {
       write(qp, active, step);
       return Outcome::solved;
-    } else if (is_cheap_ && miss_ <= small_miss) {
+    } else if (is_cheap_ && miss_ <= small_miss && return_to_base(step)) {
       write_values(step);
       write(qp, active, step);
       return Outcome::solved;
@@ -838,14 +842,24 @@ DualActiveSet::Outcome DualActiveSet::solve(const StageQp& qp, Riccati& riccati,
   return Outcome::solved;
 }
 
-/// Writes states, controls and multipliers of held bounds, which sensitivities have corrected since the step was found.
-/// Its costates have none, and are those of the multipliers before.
+/// Gives the columns the multipliers with which the step was found; false if one of these, or of a held bound, has a
+/// sign or size that its bound does not allow.
+bool DualActiveSet::return_to_base(const Iterate& step) noexcept {
+  const int count = column_count();
+  for (int k = 0; k < count; ++k)
+    if (excess_of(columns_[k], base_multipliers_[k]) > pull_tolerance_) return false;
+  for (const int place : held_places_)
+    if (side_[place] * step.bound_row(0)[place] < -pull_tolerance_ && !is_equality_bound(place)) return false;
+  std::copy_n(base_multipliers_.begin(), count, multipliers_.begin());
+  return true;
+}
+
+/// Writes states and controls, which sensitivities have corrected since the step was found. Costates have none, and go
+/// with the multipliers before: together these miss stationarity by the Hessian times the correction, which is small.
+/// The corrections of multipliers are not where columns are nearly dependent.
 void DualActiveSet::write_values(Iterate& step) const noexcept {
   std::copy_n(value_.begin(), places_, step.row(0));
-  for (const int place : held_places_) {
-    step.bound_row(0)[place] = value_[place];
-    step.row(0)[place] = bound(place);
-  }
+  for (const int place : held_places_) step.row(0)[place] = bound(place);
 }
 
 void DualActiveSet::write(const StageQp& qp, ActiveSet& active, Iterate& step) const noexcept {

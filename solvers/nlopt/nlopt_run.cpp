@@ -280,9 +280,11 @@ Run::Outcome Run::optimise() {
     accepted = accepted && nlopt_set_local_optimizer(optimiser_, local.get()) == NLOPT_SUCCESS;
   }
   if (!accepted) return Outcome::failed;
-  if (limits_.deadline != Clock::time_point::max())
-    nlopt_set_maxtime(optimiser_,
-                      std::max(1e-9, std::chrono::duration<double>(limits_.deadline - Clock::now()).count()));
+  if (limits_.deadline != Clock::time_point::max()) {
+    const Clock::time_point now = Clock::now();  // from a deadline that is long past, the difference may overflow
+    const auto left = limits_.deadline > now ? limits_.deadline - now : Clock::duration::zero();
+    nlopt_set_maxtime(optimiser_, std::max(1e-9, std::chrono::duration<double>(left).count()));
+  }
   nlopt_srand(static_cast<unsigned long>(options_.seed));
 
   Vector y = Vector::Zero(n);

@@ -23,8 +23,13 @@ using testing::RandomProblem;
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-/// What a call that has to return promptly may last, on a machine that is busy with other things.
+/// What a call that has to return promptly may last, on a machine that is busy with other things. Sanitizers make it
+/// several times as long.
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+constexpr std::chrono::seconds promptly{60};
+#else
 constexpr std::chrono::seconds promptly{10};
+#endif
 
 // --- after a failure ------------------------------------------------------------------------------------------------
 

@@ -9,7 +9,15 @@
 namespace rhec::kernels {
 namespace {
 
+// Sanitizers check each access, which makes inlined code large and its compilation long: with them, the compiler
+// decides.
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define RHEC_ALWAYS_INLINE
+constexpr bool has_checks = true;
+#else
 #define RHEC_ALWAYS_INLINE __attribute__((always_inline))
+constexpr bool has_checks = false;
+#endif
 
 /// A compile-time number, and lists of them. (The standard's templates could be merged with the instance of another
 /// instruction set by the linker.)

@@ -138,12 +138,14 @@ class RHEC_EXPORT DualActiveSet {
   void return_to_bounds() noexcept;
   void write_pending(const Riccati& riccati) noexcept;
   void release_column(int column, Weights& weights) noexcept;
+  double excess_of(int place, double multiplier) const noexcept;
   void drop_wrong_columns(const Riccati& riccati) noexcept;
   bool release_wrong_held() noexcept;
   bool drop_wrong(const Riccati& riccati) noexcept;
   Violations find_violations() noexcept;
   bool add_controls_together(const StageQp& qp, Riccati& riccati, int worst) noexcept;
   int list_with_next(int first, int* places) const noexcept;
+  bool return_to_base(const Iterate& step) noexcept;
   void write_values(Iterate& step) const noexcept;
   void append_column(int place, double square, double multiplier) noexcept;
   Outcome add(const StageQp& qp, Riccati& riccati, int entering, Clock::time_point deadline) noexcept;
@@ -169,8 +171,8 @@ class RHEC_EXPORT DualActiveSet {
   int factorisations_ = 0, changes_ = 0, states_ = 0, stride_ = 0, limit_row_ = 0;
   int most_columns_ = 0, batch_count_ = 0, most_changes_ = 0;
   int places_ = 0, all_places_ = 0;  ///< number of places that the QP uses: of variables, and of limits too
-  bool has_limits_ = false;
-  bool needs_all_held_ = false, is_convex_ = false, has_bounds_ = false, has_policy_ = false, has_base_ = false;
+  bool has_limits_ = false, needs_all_held_ = false, is_convex_ = false;
+  bool has_bounds_ = false, has_policy_ = false, has_base_ = false;
   double pull_tolerance_ = 0.0, miss_ = 0.0;
   const double *lower_ = nullptr, *upper_ = nullptr;  ///< of the QP that is being solved
   ActiveSet held_, claimed_;
@@ -187,12 +189,11 @@ class RHEC_EXPORT DualActiveSet {
   std::vector<double> linear_, softness_;  ///< by limit: weight of the slack, reciprocal quadratic weight (or 0)
   std::vector<std::uint8_t> relaxed_;
   std::vector<Batch> batches_;
-  std::vector<int> columns_;  ///< active bounds that are not held, in the order of the Cholesky factor
-  std::vector<double> multipliers_, factor_;
-  Weights pending_{};  ///< changes of multipliers that the values do not have yet
-  std::vector<int> base_places_;
-  std::vector<double> base_multipliers_;  ///< with which the step was found
-  std::vector<double> h_;                 ///< the QP's gradient plus the multipliers of the columns
+  /// Active bounds that are not held, in the order of the Cholesky factor, and those with which the step was found.
+  std::vector<int> columns_, base_places_;
+  std::vector<double> multipliers_, base_multipliers_, factor_;
+  Weights pending_{};      ///< changes of multipliers that the values do not have yet
+  std::vector<double> h_;  ///< the QP's gradient plus the multipliers of the columns
   Iterate policy_step_;
 };
 
