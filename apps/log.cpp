@@ -44,7 +44,8 @@ void print_topic(const logs::TopicSurvey& topic) {
   if (!topic.unreadable.empty()) fmt::print("  not understood: {}\n", topic.unreadable);
   for (const logs::FieldSurvey& field : topic.fields) {
     const std::string missing = field.count < topic.count ? fmt::format(", {} missing", topic.count - field.count) : "";
-    const std::string name = is_table ? field.name : topic.topic.name + ":" + field.name;
+    const std::string unit = field.unit.empty() ? "" : fmt::format(" [{}]", field.unit);
+    const std::string name = (is_table ? field.name : topic.topic.name + ":" + field.name) + unit;
     if (field.count == 0)
       fmt::print("  {:<48} no value\n", name);
     else if (field.least == field.most)

@@ -38,7 +38,7 @@ std::span<const std::byte> bytes_at(sqlite3_stmt* query, int column) {
 class Db3Log final : public MessageLog {
  public:
   Db3Log(const std::filesystem::path& file, const MessageLogOptions& options)
-      : MessageLog(file.string(), options), file_(file) {
+      : MessageLog(options.name.empty() ? file.string() : options.name, options), file_(file) {
     const Database database = open();
     const std::set<std::string> tables = tables_of(database.get());
     if (!tables.contains("topics") || !tables.contains("messages"))
@@ -52,7 +52,7 @@ class Db3Log final : public MessageLog {
     const Database database = open();
     std::string of_topics;
     for (const auto& [id, topic] : topic_of_id_)
-      if (static_cast<std::size_t>(topic) < wanted.size() && wanted[static_cast<std::size_t>(topic)])
+      if (static_cast<std::size_t>(topic.topic) < wanted.size() && wanted[static_cast<std::size_t>(topic.topic)])
         of_topics += fmt::format("{}{}", of_topics.empty() ? "" : ",", id);
     if (of_topics.empty()) return std::nullopt;
     // In the order of the file, which is that of arrival: sorting would take a large bag's memory.
@@ -66,7 +66,8 @@ class Db3Log final : public MessageLog {
     while ((code = sqlite3_step(query.get())) == SQLITE_ROW) {
       const auto topic = topic_of_id_.find(sqlite3_column_int64(query.get(), 1));
       if (topic == topic_of_id_.end()) continue;
-      record.topic = topic->second;
+      record.topic = topic->second.topic;
+      record.form = topic->second.form;
       record.place = sqlite3_column_int64(query.get(), 0);
       record.received = sqlite3_column_int64(query.get(), 2);
       record.bytes = bytes_at(query.get(), 3);
@@ -156,7 +157,7 @@ class Db3Log final : public MessageLog {
 
   std::filesystem::path file_;
   std::map<std::string, MessageEncoding> definitions_;
-  std::map<std::int64_t, int> topic_of_id_;
+  std::map<std::int64_t, Place> topic_of_id_;
 };
 
 }  // namespace

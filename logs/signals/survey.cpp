@@ -81,7 +81,8 @@ class Taker {
       return;
     }
     values_.resize(request.fields.size());
-    for (const std::string& field : request.fields) result_.fields.push_back({.name = field});
+    for (const std::string& field : request.fields)
+      result_.fields.push_back({.name = field, .unit = log_.unit_of(record.topic, field)});
   }
 
   static void take(double value, FieldSurvey& field) noexcept {

@@ -15,6 +15,7 @@ struct FieldSurvey {
   std::int64_t count = 0;          ///< values that are not missing
   double least = 0.0, most = 0.0;  ///< of them
   double first = 0.0;
+  std::string unit = {};  ///< where the log says it: see Log::unit_of
 };
 
 /// What there is of one topic.
