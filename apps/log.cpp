@@ -41,6 +41,7 @@ void print_topic(const logs::TopicSurvey& topic) {
   if (topic.largest_lateness > 1e-3) fmt::print(", received up to {:.3g} s after the stamp", topic.largest_lateness);
   if (topic.backwards > 0) fmt::print(", {} stamps before the one before", topic.backwards);
   fmt::print("\n");
+  if (topic.broken > 0) fmt::print("  {} of them cannot be read, the first: {}\n", topic.broken, topic.first_broken);
   if (!topic.unreadable.empty()) fmt::print("  not understood: {}\n", topic.unreadable);
   for (const logs::FieldSurvey& field : topic.fields) {
     const std::string missing = field.count < topic.count ? fmt::format(", {} missing", topic.count - field.count) : "";

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "rhec/core/base/error.hpp"
+#include "rhec/logs/signals/calendar.hpp"
 #include "rhec/logs/signals/log.hpp"
 #include "rhec/logs/signals/units.hpp"
 
@@ -84,6 +85,15 @@ int find_clock(const CsvLayout& layout) {
     }
   }
   return -1;
+}
+
+/// The first column that has a date or a time of day, whatever it is called.
+int column_of_dates(const CsvLayout& layout, std::string_view line) {
+  int found = -1;
+  for_each_cell(line, layout.separator, [&](std::string_view cell, std::size_t i) {
+    if (found < 0 && i < layout.columns.size() && calendar_stamp(cell)) found = static_cast<int>(i);
+  });
+  return found;
 }
 
 std::vector<std::string_view> cells_of(std::string_view line, char separator) {
@@ -232,6 +242,7 @@ CsvLayout csv_layout(const std::string& file, const std::vector<std::string>& fi
   }
   set_decimal_marks(layout, lines, next);
   layout.clock = find_clock(layout);
+  if (layout.clock < 0 && next < lines.size()) layout.clock = column_of_dates(layout, lines[next]);
   layout.received = layout.find(received_clock);
   return layout;
 }

@@ -68,6 +68,8 @@ TEST(CsvLayout, FindsTheClock) {
   EXPECT_EQ(of({"x,timestamp_ms"}).clock, 1);
   EXPECT_EQ(of({"x,timestamp_ms"}).unit_of_clock(1), 1e6);
   EXPECT_EQ(of({"x,T"}).clock, -1) << "a temperature";
+  EXPECT_EQ(of({"x,Zeit", "1,2024-05-01T12:00:00Z"}).clock, 1) << "by what is in it";
+  EXPECT_EQ(of({"x,time,Zeit", "1,2,2024-05-01T12:00:00Z"}).clock, 1);
   EXPECT_EQ(of({"received,x,t"}).clock, 2);
   EXPECT_EQ(of({"received,x,t"}).received, 0);
 }

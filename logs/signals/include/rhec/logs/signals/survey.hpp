@@ -29,7 +29,9 @@ struct TopicSurvey {
   double largest_lateness = 0.0;            ///< between measured and received [s]
   std::int64_t backwards = 0;               ///< records with a stamp before that of the one before them
   std::vector<FieldSurvey> fields;
-  std::string unreadable;  ///< why nothing is known of its fields; empty: something is
+  std::int64_t broken = 0;   ///< messages that cannot be read
+  std::string first_broken;  ///< where the first of them is, and what is wrong with it
+  std::string unreadable;    ///< why nothing is known of its fields; empty: something is
 };
 
 struct Survey {
