@@ -138,6 +138,7 @@ class Proposer {
         if (field.count == 0) continue;
         by_name(topic, field, variable, quantity);
       }
+      by_pairs(topic, variable, quantity);
       if (!is_table) by_type(topic, quantity);
       if (is_table) by_columns(topic, quantity);
     }
@@ -205,7 +206,7 @@ class Proposer {
     if (is_table && (quantity == Quantity::speed || quantity == Quantity::ground_speed) &&
         has_any(name, {"speed", "velocity", "radar"}) && !has_any(name, {"left", "right", "ang", "steer"}))
       add_field(topic, field, variable,
-                has_any(name, {"radar", "ground", "gps"}) == (quantity == Quantity::ground_speed) ? 4.0 : 3.0);
+                has_any(name, {"radar", "ground", "gps"}) == (quantity == Quantity::ground_speed) ? 4.0 : 2.0);
     if (is_table && quantity == Quantity::heading && has_any(name, {"heading", "yaw", "compass"}) && !is_velocity)
       add_heading(topic, field, variable);
     if (is_table && quantity == Quantity::yaw_rate &&
@@ -281,6 +282,34 @@ class Proposer {
     }
     if (type == "ackermann_msgs/msg/AckermannDriveStamped" && quantity == Quantity::speed)
       add(plain(name + ":drive.speed"), 2.0);
+  }
+
+  /// The speed of a vehicle from the wheels of both sides.
+  void by_pairs(const TopicSurvey& topic, const Variable& variable, Quantity quantity) {
+    if (quantity != Quantity::speed || variable.unit != "m/s") return;
+    for (const FieldSurvey& left : topic.fields) {
+      const std::size_t at = lower(left.name).find("left");
+      if (at == std::string::npos || left.name.starts_with("position[") || left.name.starts_with("effort[")) continue;
+      for (const FieldSurvey& right : topic.fields) {
+        std::string other = lower(left.name);
+        if (lower(right.name) != other.replace(at, 4, "right")) continue;
+        const std::string both = fmt::format("{{from: [{}, {}], as: mean", plain(signal_of(topic, left.name)),
+                                             plain(signal_of(topic, right.name)));
+        const std::string name = lower(left.name), guessed = left.unit.empty() ? unit_guessed(left, variable.unit) : "";
+        const std::optional<Unit> unit = find_unit(left.unit.empty() ? guessed : left.unit);
+        const std::string told = guessed.empty() ? "" : ", unit: " + guessed;
+        const bool is_joint = left.name.starts_with("velocity[");
+        if (is_joint || (unit && unit->si == "rad/s"))
+          add(fmt::format("{}{}, radius: 0.3}}    # the wheel's radius [m]", both, is_joint ? ", unit: rad/s" : told),
+              is_joint ? 3.4 : 3.7);
+        else if (has_any(name, {"tick", "count", "encoder"}))
+          add(both +
+                  ", counts: 1024, radius: 0.3, derivative: true}    # counts in a turn of the wheel, its radius [m]",
+              3.2);
+        else if (has_any(name, {"speed", "vel"}) && (!unit || unit->si == "m/s"))
+          add(fmt::format("{}{}}}", both, told), 3.7);
+      }
+    }
   }
 
   void by_columns(const TopicSurvey& topic, Quantity quantity) {

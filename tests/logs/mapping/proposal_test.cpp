@@ -116,6 +116,19 @@ TEST(Proposal, HasTheUnitsThatSignalsSeemToHave) {
   EXPECT_THAT(known, testing::HasSubstr("delta: \"steer, \\\"left\\\"\"    #"));
 }
 
+TEST(Proposal, TheSpeedIsThatOfTheWheelsOfBothSides) {
+  Survey survey;
+  survey.topics = {topic("", "table", {"Radar speed", "rpm left", "rpm right"})};
+  EXPECT_THAT(
+      propose_signals(survey, described()),
+      testing::HasSubstr(
+          "v: {from: [\"rpm left\", \"rpm right\"], as: mean, unit: rpm, radius: 0.3}    # the wheel's radius"));
+  survey.topics = {topic("/joint_states", "sensor_msgs/msg/JointState",
+                         {"position[Left]", "position[Right]", "velocity[Left]", "velocity[Right]"})};
+  const std::string proposal = propose_signals(survey, described());
+  EXPECT_EQ(from(proposal, "v"), "/joint_states:velocity[Left]") << proposal;
+}
+
 TEST(Proposal, TopicsMayHaveAnyName) {
   Survey survey;
   survey.topics = {topic("gps/front", "sensor_msgs/msg/NavSatFix", {"latitude"}),
