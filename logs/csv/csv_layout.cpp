@@ -29,6 +29,39 @@ std::string lower(std::string_view text) {
   return result;
 }
 
+/// Whether bytes are UTF-8, as far as its marks go.
+bool is_utf8(std::string_view text) {
+  int following = 0;
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    const bool follows = (byte & 0xC0u) == 0x80u;
+    if (follows != (following > 0)) return false;
+    if (follows) {
+      --following;
+    } else {
+      following = byte < 0x80u ? 0 : byte >= 0xF0u ? 3 : byte >= 0xE0u ? 2 : byte >= 0xC2u ? 1 : -1;
+    }
+    if (following < 0) return false;
+  }
+  return following == 0;
+}
+
+/// Spreadsheets save tables in Latin-1, too; names are UTF-8 everywhere else.
+std::string in_utf8(std::string_view text) {
+  if (is_utf8(text)) return std::string(text);
+  std::string result;
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (byte < 0x80u) {
+      result += c;
+    } else {
+      result += static_cast<char>(0xC0u | byte >> 6u);
+      result += static_cast<char>(0x80u | (byte & 0x3Fu));
+    }
+  }
+  return result;
+}
+
 bool is_number(std::string_view cell) {
   double value = missing;
   return (read_csv_number(cell, '.', value) || read_csv_number(cell, ',', value)) && !std::isnan(value);
@@ -106,10 +139,12 @@ std::vector<std::string_view> cells_of(std::string_view line, char separator) {
 char separator_of(std::string_view header, std::string_view data) {
   char best = ',';
   std::size_t most = 0;
-  for (const char each : {';', '\t', ','}) {
+  for (const char each : {';', '\t', ',', ' '}) {
     const std::size_t count = cells_of(header, each).size(), below = cells_of(data, each).size();
     const bool agrees = data.empty() || count == below || count + 1 == below;
-    const std::size_t points = count < 2 ? 0 : 2 * count + (agrees ? 1000000 : 0);
+    // A blank is within names more often than it separates them.
+    const bool is_blank_in_name = each == ' ' && (most > 0 || !agrees || data.empty());
+    const std::size_t points = count < 2 || is_blank_in_name ? 0 : 2 * count + (agrees ? 1000000 : 0);
     if (points > most) {
       most = points;
       best = each;
@@ -206,6 +241,7 @@ ClockUnit CsvLayout::unit_of_clock(int column) const {
 
 CsvLayout csv_layout(const std::string& file, const std::vector<std::string>& first_lines) {
   std::vector<std::string> lines = first_lines;
+  for (std::string& line : lines) line = in_utf8(line);
   if (!lines.empty() && lines[0].starts_with("\xEF\xBB\xBF")) lines[0].erase(0, 3);
   std::optional<char> separator;
   const std::size_t at = header_line(lines, separator);

@@ -70,17 +70,21 @@ class Db3Log final : public MessageLog {
                                             of_topics));
     Reading reading{.take = take};
     std::int64_t newest = 0;
-    int code = SQLITE_OK;
-    while ((code = sqlite3_step(query.get())) == SQLITE_ROW) {
-      newest = sqlite3_column_int64(query.get(), 0);
-      hand_out({newest, sqlite3_column_int64(query.get(), 1), sqlite3_column_int64(query.get(), 2),
-                bytes_at(query.get(), 3)},
-               reading);
-      if (reading.is_over) return std::move(reading.damage);
+    std::string what = "the file is cut";
+    Db3Pages pages(file_);
+    if (!pages.is_cut_within_page()) {
+      int code = SQLITE_OK;
+      while ((code = sqlite3_step(query.get())) == SQLITE_ROW) {
+        newest = sqlite3_column_int64(query.get(), 0);
+        hand_out({newest, sqlite3_column_int64(query.get(), 1), sqlite3_column_int64(query.get(), 2),
+                  bytes_at(query.get(), 3)},
+                 reading);
+        if (reading.is_over) return std::move(reading.damage);
+      }
+      if (code == SQLITE_DONE) return unfinished();
+      what = sqlite3_errmsg(database.get());
     }
-    if (code == SQLITE_DONE) return unfinished();
-    const std::string what = sqlite3_errmsg(database.get());
-    const std::int64_t saved = hand_out_pages(newest, wanted, reading);
+    const std::int64_t saved = hand_out_pages(pages, newest, wanted, reading);
     if (reading.is_over) return std::move(reading.damage);
     return damage(newest, what, saved);
   }
@@ -119,9 +123,10 @@ class Db3Log final : public MessageLog {
   }
 
   /// What SQLite's tree does not lead to any more. Returns how many messages that are.
-  std::int64_t hand_out_pages(std::int64_t after, const std::vector<bool>& wanted, Reading& reading) const {
+  std::int64_t hand_out_pages(Db3Pages& pages, std::int64_t after, const std::vector<bool>& wanted,
+                              Reading& reading) const {
     std::int64_t count = 0;
-    Db3Pages(file_).read(after, [&](const Db3Row& row) {
+    pages.read(after, [&](const Db3Row& row) {
       const auto topic = topic_of_id_.find(row.topic_id);
       if (topic == topic_of_id_.end() || !wanted[static_cast<std::size_t>(topic->second.topic)]) return true;
       ++count;

@@ -95,6 +95,10 @@ Db3Pages::Db3Pages(const std::filesystem::path& file) : file_(file) {
   usable_ = page_size_ > reserved ? page_size_ - reserved : 0;
 }
 
+bool Db3Pages::is_cut_within_page() const noexcept {
+  return page_size_ > 0 && file_.size() % static_cast<std::int64_t>(page_size_) != 0;
+}
+
 bool Db3Pages::read_page(std::int64_t number, std::vector<std::byte>& page) {
   const std::int64_t pages = file_.size() / static_cast<std::int64_t>(page_size_);
   if (number < 1 || number > pages) return false;

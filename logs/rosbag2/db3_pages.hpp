@@ -22,6 +22,8 @@ class Db3Pages {
  public:
   explicit Db3Pages(const std::filesystem::path& file);
 
+  /// Whether the file ends within a page. SQLite takes what is missing of it for zeros, and rows in it for complete.
+  bool is_cut_within_page() const noexcept;
   /// Hands out rows whose id is above `after`, in ascending order of ids as they lie in the file, until `take` returns
   /// false. A row that is not complete is left out.
   using Take = std::function<bool(const Db3Row& row)>;

@@ -33,6 +33,9 @@ TEST(CsvLayout, TheSeparatorIsWhatHeaderAndDataAgreeOn) {
   EXPECT_EQ(of({"time;speed, left;speed, right", "0;1,5;2,5"}).separator, ';');
   EXPECT_EQ(of({"time\tspeed", "0\t1"}).separator, '\t');
   EXPECT_EQ(of({"time,a;b", "0,1"}).separator, ',');
+  EXPECT_EQ(of({"# time x", "0 1"}).separator, ' ') << "as numpy writes it";
+  EXPECT_EQ(of({"GPS Lat,GPS Lon", "48,11"}).separator, ',');
+  EXPECT_EQ(of({"time of day"}).separator, ',');
   EXPECT_EQ(of({"sep=;", "time;x", "0;1"}).separator, ';');
   EXPECT_EQ(of({"sep=;", "time;x", "0;1"}).header_lines, 2);
 }
@@ -61,6 +64,13 @@ TEST(CsvLayout, CommentsBeforeTheHeaderArePassedOver) {
   EXPECT_THAT(within.names(), ElementsAre("time", "x"));
   EXPECT_EQ(within.header_lines, 2);
   EXPECT_THAT(of({"%time,x", "0,1"}).names(), ElementsAre("%time", "x"));
+}
+
+TEST(CsvLayout, NamesInLatin1BecomeUtf8) {
+  const CsvLayout layout = of({"time;W\xE4rme [\xB0];W\xC3\xA4rme", "0;1;2"});
+  EXPECT_EQ(layout.columns[1].name, "W\xC3\xA4rme") << "one byte that is no UTF-8 makes the line Latin-1";
+  EXPECT_EQ(of({"time;W\xC3\xA4rme", "0;1"}).columns[1].name, "W\xC3\xA4rme");
+  EXPECT_EQ(of({"time;W\xE4rme [\xB0]", "0;1"}).columns[1].unit, "\xC2\xB0");
 }
 
 TEST(CsvLayout, FindsTheClock) {

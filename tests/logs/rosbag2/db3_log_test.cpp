@@ -79,7 +79,7 @@ TEST_F(Db3LogTest, ACutBagGivesWhatIsBeforeTheCut) {
 /// SQLite's tree leads to most of a bag of some megabytes by a page at its end.
 TEST_F(Db3LogTest, OfACutBagPagesAreReadThatNothingLeadsToAnyMore) {
   const std::string whole = content_of(bag(60000));
-  for (const double share : {0.3, 0.6, 0.9}) {
+  for (const double share : {0.3, 0.41234, 0.51317, 0.6, 0.77777, 0.9}) {
     const auto size = static_cast<std::size_t>(share * static_cast<double>(whole.size()));
     const Rows rows = rows_of(*open_db3(write("y.db3", whole.substr(0, size))), "/a", {{"data"}});
     ASSERT_TRUE(rows.damage);
