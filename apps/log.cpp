@@ -75,6 +75,7 @@ sim::Json json_of(const logs::TopicSurvey& topic) {
   sim::Json fields = sim::Json::array();
   for (const logs::FieldSurvey& field : topic.fields) {
     sim::Json one{{"name", field.name}, {"values", field.count}};
+    if (!field.unit.empty()) one["unit"] = field.unit;
     if (field.count > 0) {
       one["least"] = field.least;
       one["most"] = field.most;
@@ -89,6 +90,7 @@ sim::Json json_of(const logs::TopicSurvey& topic) {
           {"gap_start", topic.gap_start},
           {"largest_lateness", topic.largest_lateness},
           {"backwards", topic.backwards},
+          {"broken", topic.broken},
           {"not_understood", topic.unreadable},
           {"fields", fields}};
 }

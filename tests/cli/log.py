@@ -189,6 +189,8 @@ class Suite(Findings):
         proposed = self.work / "proposed.yaml"
         proposed.write_text(SPRAYER.split("signals:")[0] + proposal[proposal.index("signals:"):])
         self.run("estimate", proposed, log, "--out", self.work / "proposed")
+        told = json.loads(self.run("log", log, "--json").stdout)["topics"][0]
+        self.expect({field["name"]: field.get("unit") for field in told["fields"]}.get("rpm left") == "rpm" and told["broken"] == 0, "units as JSON", f"{told}")
         counts = 'signals.inputs.u1={from: ["ticks left", "ticks right"], as: mean, counts: 81920, wraps: 65536, radius: 0.6, derivative: true}'
         for settings in ((), ("--set", counts)):
             self.run("estimate", robot, log, *settings, "--out", self.work / "sprayer")
