@@ -19,7 +19,7 @@ namespace {
 constexpr std::size_t longest_line = std::size_t{1} << 20;
 // Lines that are looked at to see how a table is written.
 constexpr std::size_t most_first_lines = 200;
-constexpr double missing = std::numeric_limits<double>::quiet_NaN();
+constexpr double no_number = std::numeric_limits<double>::quiet_NaN();
 
 /// Lines of a file, each of bounded length.
 class Lines {
@@ -60,7 +60,7 @@ class Cells {
       throw RecordError(fmt::format("found {} cells, expected {}, as in the header", count, cells_.size()));
   }
   double number(std::size_t i) const {
-    double value = missing;
+    double value = no_number;
     const CsvColumn& column = column_of(i);
     if (!read_csv_number(cell(i), column.decimal_mark, value))
       throw RecordError(fmt::format("found {} in the column '{}', expected a number, with a decimal {}, or nothing",
@@ -144,7 +144,7 @@ class CsvLog final : public Log {
   std::vector<std::string> fields_of(const Record& record) const override {
     std::vector<std::string> fields;
     for_each_cell(text_of(record), layout_.separator, [&](std::string_view cell, std::size_t i) {
-      double value = missing;
+      double value = no_number;
       const bool is_clock = static_cast<int>(i) == layout_.clock || static_cast<int>(i) == layout_.received;
       if (i < layout_.columns.size() && !is_clock && read_csv_number(cell, layout_.columns[i].decimal_mark, value))
         fields.push_back(layout_.columns[i].name);
