@@ -4,6 +4,8 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <charconv>
+#include <cmath>
 #include <cstdio>
 #include <optional>
 #include <string_view>
@@ -13,6 +15,22 @@
 #include "rhec/core/config/option_values.hpp"
 
 namespace rhec::apps {
+namespace {
+
+/// CLI's own says what the largest number is that a computer knows.
+CLI::Validator number_check(const char* expected, bool (*holds)(double)) {
+  return {[=](const std::string& text) {
+            double value = 0.0;
+            const auto [end, failure] = std::from_chars(text.data(), text.data() + text.size(), value);
+            const bool is_number = failure == std::errc() && end == text.data() + text.size();
+            return is_number && holds(value) && std::isfinite(value)
+                       ? std::string()
+                       : fmt::format("found '{}', expected a number {}", text, expected);
+          },
+          ""};
+}
+
+}  // namespace
 
 Argument& Argument::required() {
   option_->required();
@@ -31,11 +49,11 @@ Argument& Argument::within(int lowest, int highest) {
   return *this;
 }
 Argument& Argument::positive() {
-  option_->check(CLI::PositiveNumber);
+  option_->check(number_check("above 0", [](double value) { return value > 0.0; }));
   return *this;
 }
 Argument& Argument::not_negative() {
-  option_->check(CLI::NonNegativeNumber);
+  option_->check(number_check("at least 0", [](double value) { return value >= 0.0; }));
   return *this;
 }
 Argument& Argument::needs(const Argument& other) {

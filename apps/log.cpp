@@ -41,10 +41,12 @@ void print_topic(const logs::TopicSurvey& topic) {
   if (topic.largest_lateness > 1e-3) fmt::print(", received up to {:.3g} s after the stamp", topic.largest_lateness);
   if (topic.backwards > 0) fmt::print(", {} stamps before the one before", topic.backwards);
   fmt::print("\n");
+  if (topic.broken > 0) fmt::print("  {} of them cannot be read, the first: {}\n", topic.broken, topic.first_broken);
   if (!topic.unreadable.empty()) fmt::print("  not understood: {}\n", topic.unreadable);
   for (const logs::FieldSurvey& field : topic.fields) {
     const std::string missing = field.count < topic.count ? fmt::format(", {} missing", topic.count - field.count) : "";
-    const std::string name = is_table ? field.name : topic.topic.name + ":" + field.name;
+    const std::string unit = field.unit.empty() ? "" : fmt::format(" [{}]", field.unit);
+    const std::string name = (is_table ? field.name : topic.topic.name + ":" + field.name) + unit;
     if (field.count == 0)
       fmt::print("  {:<48} no value\n", name);
     else if (field.least == field.most)
@@ -73,6 +75,7 @@ sim::Json json_of(const logs::TopicSurvey& topic) {
   sim::Json fields = sim::Json::array();
   for (const logs::FieldSurvey& field : topic.fields) {
     sim::Json one{{"name", field.name}, {"values", field.count}};
+    if (!field.unit.empty()) one["unit"] = field.unit;
     if (field.count > 0) {
       one["least"] = field.least;
       one["most"] = field.most;
@@ -87,6 +90,7 @@ sim::Json json_of(const logs::TopicSurvey& topic) {
           {"gap_start", topic.gap_start},
           {"largest_lateness", topic.largest_lateness},
           {"backwards", topic.backwards},
+          {"broken", topic.broken},
           {"not_understood", topic.unreadable},
           {"fields", fields}};
 }

@@ -136,7 +136,7 @@ void add(const Host& host, const std::string& name) {
       state.counters["mean_excess"] = std::accumulate(excess.begin(), excess.end(), 0.0) / excess.size();
       state.counters["largest_excess"] = *std::max_element(excess.begin(), excess.end());
     };
-    add_benchmark("chain/" + name + "/" + hessian, run);
+    add_benchmark(std::string("chain/").append(name).append("/").append(hessian), run);
   }
 }
 

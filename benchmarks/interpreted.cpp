@@ -75,8 +75,9 @@ void add(const Host& host, const Vehicle& vehicle, int horizon) {
         state.counters["interpreted_us"] = interpreted->median();
         state.counters["ratio"] = interpreted->median() / compiled->median();
       };
-      add_benchmark(
-          "interpreted/" + std::string(vehicle.name) + "/" + kind + "/" + std::to_string(horizon) + "/" + hessian, run);
+      std::string name = "interpreted/";
+      name.append(vehicle.name).append("/").append(kind).append("/").append(std::to_string(horizon)).append("/");
+      add_benchmark(name.append(hessian), run);
     }
   }
 }

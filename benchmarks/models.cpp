@@ -14,6 +14,10 @@
 namespace rhec::bench {
 namespace {
 
+constexpr const char* noise_of_two_axles =
+    "noise={outputs: {x_gps: 0.03, y_gps: 0.03, front: 0.01, rear: 0.01}, inputs: {v: 0.1, front_rate: 0.02, "
+    "rear_rate: 0.02}}";
+
 struct Vehicle {
   const char* model;
   const char* scenario;
@@ -30,10 +34,8 @@ const Vehicle vehicles[] = {
      {"estimator.solver=gn_rti", "controller.solver=gn_rti", "controller.blocking={}"}},
     {"two_axle_steering (any size)",
      RHEC_SOURCE_DIRECTORY "/plugins/template/field.yaml",
-     {"model=two_axle_steering",
-      "noise={outputs: {x_gps: 0.03, y_gps: 0.03, front: 0.01, rear: 0.01}, inputs: {v: 0.1, front_rate: 0.02, "
-      "rear_rate: 0.02}}",
-      "estimator.solver=gn_rti", "controller.solver=gn_rti", "controller.blocking={}"}},
+     {"model=two_axle_steering", noise_of_two_axles, "estimator.solver=gn_rti", "controller.solver=gn_rti",
+      "controller.blocking={}"}},
 };
 
 void add(const Host& host, const Vehicle& vehicle) {

@@ -9,9 +9,10 @@ namespace rhec::apps::ros {
 namespace {
 
 void check_topic(const Settings& section, std::string_view key, const std::string& name) {
-  if (name.empty() || (name.starts_with('/') && name.size() > 1 && !name.ends_with('/'))) return;
+  if (name.empty() || is_topic_name(name)) return;
   const Settings* const at = section.find(key);
-  throw(at ? *at : section).error(fmt::format("found '{}', expected a full name, such as /fix", name));
+  throw(at ? *at : section)
+      .error(fmt::format("found '{}', expected a full name, such as /fix, of letters, digits, _ and /", name));
 }
 
 }  // namespace
@@ -129,6 +130,17 @@ const OptionTable<RosOptions>& RosOptions::table() {
 std::vector<OptionSection> ros_sections() {
   return {{"ros", "For `rhec ros`: how a live node takes part in ROS 2. Topics of measurements are named in `signals`.",
            RosOptions::table().schema()}};
+}
+
+bool is_topic_name(std::string_view name) noexcept {
+  for (char before = '\0'; const char c : name) {
+    const bool is_letter = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_',
+               is_digit = c >= '0' && c <= '9';
+    const bool begins = before == '\0' || before == '/';
+    if (before == '\0' ? c != '/' : !(is_letter || (is_digit && !begins) || (c == '/' && !begins))) return false;
+    before = c;
+  }
+  return name.size() > 1 && !name.ends_with('/');
 }
 
 RosOptions read_ros_options(const Settings& section) {

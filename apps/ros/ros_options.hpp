@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "rhec/core/config/options.hpp"
@@ -83,6 +84,9 @@ struct RosOptions {
 };
 
 std::vector<OptionSection> ros_sections();
+
+/// Whether ROS 2 takes it for the full name of a topic: "/robot1/fix".
+bool is_topic_name(std::string_view name) noexcept;
 
 /// The options of a section `ros`, checked as a whole. Throws Error with file, line and key.
 RosOptions read_ros_options(const Settings& section);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 
 namespace rhec {
@@ -44,7 +45,24 @@ Clocks::Place Clocks::place(const Source& source, double time) const noexcept {
   const auto later = std::count_if(source.times.begin(), source.times.begin() + static_cast<std::ptrdiff_t>(known),
                                    [&](double other) { return other > time + 0.25 * source.usual; });
   const bool is_known = static_cast<double>(later) >= 0.5 * std::min(expected, static_cast<double>(remembered));
-  return is_known ? Place::repeated : Place::late;
+  return is_known && is_within(source, time) ? Place::repeated : Place::late;
+}
+
+/// Of what is older than all that is remembered nobody knows otherwise. A message that came too late has left a gap
+/// twice as wide.
+bool Clocks::is_within(const Source& source, double time) noexcept {
+  constexpr double wide = 1.7;
+  const std::size_t known = std::min(source.count, remembered);
+  std::array<double, remembered> times = source.times;
+  const auto end = times.begin() + static_cast<std::ptrdiff_t>(known);
+  std::sort(times.begin(), end);
+  const auto above = std::upper_bound(times.begin(), end, time);
+  if (above == times.begin() || above == end) return true;
+  const double around = *above - *std::prev(above);
+  for (std::size_t i = 0; i + 1 < known; ++i) times[i] = times[i + 1] - times[i];
+  const auto middle = times.begin() + static_cast<std::ptrdiff_t>((known - 1) / 2);
+  std::nth_element(times.begin(), middle, std::prev(end));
+  return around < wide * *middle;
 }
 
 double Clocks::use(Source& source, double time) noexcept {

@@ -7,6 +7,7 @@
 #include <limits>
 #include <map>
 #include <optional>
+#include <set>
 #include <utility>
 
 #include "field_path.hpp"
@@ -206,6 +207,15 @@ class Walker {
     for (std::uint64_t i = 0; i < count; ++i) skip_item(field);
   }
 
+  /// The name by which the structure that comes next can be asked for; empty: it has none.
+  std::string peek_name(int index) {
+    if (key_field(structure_at(index)) < 0) return {};
+    const std::size_t place = cursor_.place();
+    std::string name(key_at(index));
+    cursor_.go_to(place);
+    return index_in(name) ? std::string() : name;
+  }
+
   void skip_item(const FieldDefinition& field) {
     if (field.kind == Kind::structure) {
       skip_structure(field.structure);
@@ -355,10 +365,18 @@ class PathLister {
                   int depth) {
     const std::uint64_t count = walker_.count_of(field);
     const bool is_shown = count <= longest_list;
+    std::set<std::string> taken;  // of items that have names of their own
     for (std::uint64_t i = 0; i < count; ++i) {
       std::string item = path;
       const bool is_named = i < names.size() && is_number(field.kind) && names[i].find(']') == std::string::npos;
-      if (field.shape != Shape::single) item += is_named ? fmt::format("[{}]", names[i]) : fmt::format("[{}]", i);
+      std::string own;
+      if (field.shape == Shape::sequence && field.kind == Kind::structure && is_shown)
+        own = walker_.peek_name(field.structure);
+      if (own.find_first_of("[]") != std::string::npos || !taken.insert(own).second) own.clear();
+      if (field.shape != Shape::single)
+        item += is_named       ? fmt::format("[{}]", names[i])
+                : !own.empty() ? fmt::format("[{}]", own)
+                               : fmt::format("[{}]", i);
       if (is_number(field.kind)) {
         if (!is_shown) return cursor_.skip_numbers(field.kind, count);
         cursor_.skip_numbers(field.kind, 1);

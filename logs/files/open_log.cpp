@@ -21,8 +21,8 @@ constexpr const char* known = "expected MCAP, a bag of rosbag2 (.db3, or its fol
 std::unique_ptr<Log> open_log(const std::filesystem::path& path, const MessageLogOptions& options) {
   if (!std::filesystem::exists(path)) throw Error(fmt::format("{}: there is no such file; {}", path.string(), known));
   if (std::filesystem::is_directory(path)) {
-    if (std::filesystem::exists(path / "metadata.yaml")) return open_bag_folder(path, options);
-    throw Error(fmt::format("{}: found a folder without metadata.yaml; {}", path.string(), known));
+    if (std::filesystem::exists(path / "metadata.yaml") || has_bag_files(path)) return open_bag_folder(path, options);
+    throw Error(fmt::format("{}: found a folder without metadata.yaml and files of a bag; {}", path.string(), known));
   }
   InputFile file(path);
   std::vector<std::byte> head(static_cast<std::size_t>(std::min<std::int64_t>(file.size(), 512)));

@@ -69,7 +69,8 @@ class DriveReader {
         throw Error(fmt::format("{}: {} has no value for {}{}; `rhec log {}` lists what there is", log_.name(),
                                 each.source, each.variable, drive_.damage ? ": " + drive_.damage->what : std::string(),
                                 log_.name()));
-    const double shift = shift_of_arrivals();
+    forget_useless_arrivals();
+    const double shift = useless_arrivals_ ? 0.0 : shift_of_arrivals();
     Stamp first = raw_.front().stamp;
     for (const RawEvent& each : raw_) first = std::min(first, each.stamp);
     drive_.start = std::abs(seconds_between(0, first)) < since_1970 ? 0 : first;
@@ -81,6 +82,15 @@ class DriveReader {
                      [](const DriveEvent& a, const DriveEvent& b) { return a.arrival < b.arrival; });
     join_inputs();
     drive_.origin = stream_.origin();
+  }
+
+  /// Where all records were received at one time, as those of converters that leave it out, nobody has said when.
+  void forget_useless_arrivals() {
+    const auto is_of_first = [&](const RawEvent& each) { return each.arrival == raw_.front().arrival; };
+    const auto has_stamp_of_first = [&](const RawEvent& each) { return each.stamp == raw_.front().stamp; };
+    useless_arrivals_ = std::ranges::all_of(raw_, is_of_first) && !std::ranges::all_of(raw_, has_stamp_of_first);
+    if (useless_arrivals_)
+      for (RawEvent& each : raw_) each.arrival = each.stamp;
   }
 
   double shift_of_arrivals() const {
@@ -142,6 +152,7 @@ class DriveReader {
   SignalStream stream_;
   Drive drive_;
   std::vector<RawEvent> raw_;
+  bool useless_arrivals_ = false;
 };
 
 }  // namespace

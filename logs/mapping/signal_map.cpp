@@ -4,17 +4,18 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <span>
 #include <utility>
 
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/base/infinity.hpp"
-#include "rhec/logs/mapping/units.hpp"
+#include "rhec/logs/signals/units.hpp"
 
 namespace rhec::logs {
 namespace {
 
-constexpr double most_delay = 10.0;
+constexpr double most_delay = 10.0, whole_turn = 2.0 * std::numbers::pi;
 
 bool is_geodetic(SignalForm form) {
   return form == SignalForm::east || form == SignalForm::north || form == SignalForm::up;
@@ -23,7 +24,7 @@ bool is_geodetic(SignalForm form) {
 /// What kind of number comes out of a form, without a unit of its own.
 std::string unit_after(SignalForm form, const std::string& unit) {
   if (is_geodetic(form)) return "m";
-  if (form == SignalForm::heading) return "rad";
+  if (form == SignalForm::heading || form == SignalForm::direction) return "rad";
   if (form == SignalForm::turn && unit == "m/s") return "rad/s";
   return unit;
 }
@@ -82,11 +83,12 @@ std::vector<SignalCondition> conditions_in(const Settings& when) {
   return conditions;
 }
 
-/// A condition is looked at in the records that have the value.
-void check_topics(const MappedSignal& signal) {
+/// A condition is looked at in the records that have the value. Before it is known what there is in a log, "/a" may be
+/// a topic or a column.
+void check_topics(const MappedSignal& signal, bool is_resolved) {
   const auto check = [&](const SignalName& of, const Settings& key) {
     for (const SignalName& from : signal.from)
-      if (from.topic != of.topic)
+      if (from.topic != of.topic && (is_resolved || (!from.field.empty() && !of.field.empty())))
         throw key.error(fmt::format("'{}{}{}' is in other records than the value itself; expected a signal {}",
                                     of.topic, of.topic.empty() ? "" : ":", of.field,
                                     from.topic.empty() ? "of the table" : "of " + from.topic));
@@ -112,19 +114,23 @@ void set_accuracy(MappedSignal& signal, const Settings& keys) {
   if (key.kind() != Settings::Kind::scalar)
     throw key.mismatch("a signal, such as /fix:position_covariance[0] or the name of a column");
   signal.accuracy = {parse_signal_name(key.as_text()), is_variance};
+  if (options.derivative) throw key.error("is of what is measured, and not of its rate; leave it out");
   if (signal.accuracy->of.field.empty())
     throw key.error(fmt::format("'{}' is a topic; expected one of its fields, e.g. '{}:position_covariance[0]'",
                                 signal.accuracy->of.topic, signal.accuracy->of.topic));
 }
 
-void check_count(const MappedSignal& signal, const Settings& entry) {
+/// `is_resolved`: names are known to be topics or columns; before, "fix" may be either.
+void check_count(const MappedSignal& signal, const Settings& entry, bool is_resolved) {
   const std::size_t count = signal.from.size();
   const SignalForm form = signal.options.form;
-  const bool is_whole_topic = count == 1 && !signal.from.front().topic.empty();
+  const bool is_whole_topic = count == 1 && (!is_resolved || !signal.from.front().topic.empty());
+  const bool are_topics = std::ranges::all_of(
+      signal.from, [&](const SignalName& each) { return !is_resolved || (!each.topic.empty() && each.field.empty()); });
   if (form == SignalForm::value && count != 1)
-    throw entry.error(
-        fmt::format("found {} signals, expected one; or give the form: mean, turn, heading, east, north", count));
-  if (form == SignalForm::value && signal.from.front().field.empty())
+    throw entry.error(fmt::format(
+        "found {} signals, expected one; or give the form: mean, turn, heading, direction, east, north", count));
+  if (is_resolved && form == SignalForm::value && signal.from.front().field.empty())
     throw entry.error(
         fmt::format("'{}' is a topic; expected one of its fields, e.g. '{}:data'; or the form: east, "
                     "north, up, heading",
@@ -135,37 +141,65 @@ void check_count(const MappedSignal& signal, const Settings& entry) {
   if (is_geodetic(form) && !is_whole_topic && count != 2 && count != 3)
     throw entry.error(
         fmt::format("found {} signals, expected a topic such as /fix, or latitude, longitude and height", count));
+  if (form == SignalForm::direction && count != 4 &&
+      !(count == 2 &&
+        (are_topics || std::ranges::none_of(signal.from, [](const SignalName& each) { return each.field.empty(); }))))
+    throw entry.error(
+        fmt::format("found {} signals, expected two topics of fixes, two numbers, to the east and to the north, or the "
+                    "columns latitude, longitude, latitude, longitude",
+                    count));
+  if (form == SignalForm::yaw_rate && !is_whole_topic && count != 3)
+    throw entry.error(fmt::format(
+        "found {} signals, expected a vector, such as /imu:angular_velocity, or the three columns x, y, z", count));
   if (form == SignalForm::turn && count != 2)
     throw entry.error(fmt::format("found {} signals, expected two: of the left and of the right side", count));
 }
 
-/// sign * scale * unit * radius, once it is sure that what comes out has the variable's unit.
-void set_factor(MappedSignal& signal, const Settings& entry) {
+/// What rates and rotations may lack.
+std::string hint_for(const std::string& unit, const MappedSignal& signal) {
+  if (unit == unit_rolled(signal.variable.unit)) return ", or the `radius` of a wheel";
+  if (unit_of_rate(unit) == signal.variable.unit && !signal.options.derivative) return ", or `derivative: true`";
+  return "";
+}
+
+/// sign * scale * unit * radius, once it is sure that what comes out has the variable's unit. `unit_name` is that of
+/// the signal, `place` where it is told.
+void set_factor(MappedSignal& signal, const std::string& unit_name, const Settings& place, const Settings& entry) {
   const SignalOptions& options = signal.options;
-  const Settings* const unit_key = entry.find("unit");
   std::string unit;
   signal.factor = options.sign * options.scale.value_or(1.0);
-  if (!options.unit.empty()) {
-    const std::optional<Unit> found = find_unit(options.unit);
+  if (!unit_name.empty()) {
+    const std::optional<Unit> found = find_unit(unit_name);
     if (!found)
-      throw unit_key->error(
-          fmt::format("found '{}', expected a unit{}", options.unit, suggestion_for(options.unit, unit_names())));
+      throw place.error(
+          fmt::format("found '{}', expected a unit{}", unit_name, suggestion_for(unit_name, unit_names())));
     unit = found->si;
     signal.factor *= found->factor;
   }
+  if (options.counts) {
+    if (!unit.empty()) throw place.error("is given by `counts`, which makes angles; leave one of them out");
+    unit = "rad";
+    signal.factor *= whole_turn / *options.counts;
+  }
+  const bool is_direction = options.form == SignalForm::heading || options.form == SignalForm::direction;
   signal.is_angle =
-      options.form == SignalForm::heading || unit == "rad" || (unit.empty() && signal.variable.unit == "rad/s");
+      is_direction || (!options.counts && (unit == "rad" || (unit.empty() && signal.variable.unit == "rad/s")));
+  signal.period = options.wraps ? *options.wraps * std::abs(signal.factor) : signal.is_angle ? whole_turn : 0.0;
   if (options.radius) {
     const bool is_inverse = unit == "m/s" || unit == "m";
     signal.factor *= is_inverse ? 1.0 / *options.radius : *options.radius;
+    signal.period *= is_inverse ? 1.0 / *options.radius : *options.radius;
     if (!unit.empty()) unit = unit_rolled(unit);
   }
   if (options.form == SignalForm::turn) {
     if (!options.track) throw entry.error("as: turn: needs `track`, the distance of the two sides [m]");
     signal.factor /= *options.track;
+    signal.period /= *options.track;
   }
-  if (is_geodetic(options.form) || options.form == SignalForm::heading) {
-    if (unit_key) throw unit_key->error("is given by the form; leave it out");
+  if (options.form == SignalForm::mean && options.wraps) signal.period /= static_cast<double>(signal.from.size());
+  signal.sigma_factor = options.sigma_scale * std::abs(signal.factor);
+  if (is_geodetic(options.form) || is_direction) {
+    if (!unit_name.empty()) throw place.error("is given by the form; leave it out");
   } else if (unit.empty() || options.scale) {
     return;  // who scales knows
   }
@@ -173,8 +207,69 @@ void set_factor(MappedSignal& signal, const Settings& entry) {
   if (options.derivative) unit = unit_of_rate(unit);
   if (unit != signal.variable.unit)
     throw entry.error(fmt::format("gives [{}], but {} is in [{}]; expected another unit or form{}", unit,
-                                  signal.variable.name, signal.variable.unit,
-                                  unit == unit_rolled(signal.variable.unit) ? ", or the `radius` of a wheel" : ""));
+                                  signal.variable.name, signal.variable.unit, hint_for(unit, signal)));
+}
+
+/// What belongs to some forms alone.
+void check_form(const MappedSignal& signal, const Settings& keys) {
+  const SignalOptions& options = signal.options;
+  const SignalForm form = options.form;
+  if (!options.rpy.empty() && form != SignalForm::heading && form != SignalForm::yaw_rate)
+    throw keys.find("rpy")->error("is for `as: heading` and `as: yaw_rate`; expected one of them");
+  if (!options.rpy.empty() && options.rpy.size() != 3)
+    throw keys.find("rpy")->error(
+        fmt::format("found {} numbers, expected roll, pitch and yaw [rad]", options.rpy.size()));
+  if (options.wraps && !options.derivative)
+    throw keys.find("wraps")->error("is for the rate of a count; expected `derivative: true` beside it");
+  if (options.derivative && signal.is_output && signal.variable.unit != "m/s" && signal.variable.unit != "rad/s")
+    throw keys.find("derivative")
+        ->error(
+            fmt::format("is for rates, but {} is in [{}]; leave it out", signal.variable.name, signal.variable.unit));
+}
+
+/// Of a log, what a name means there: topics may be called "fix", and columns "/fix/latitude".
+SignalName resolved_name(const SignalName& name, const Log& log, bool is_table) {
+  const std::string text = name.topic.empty()   ? name.field
+                           : name.field.empty() ? name.topic
+                                                : name.topic + ":" + name.field;
+  if (is_table) return {"", text};
+  const std::string* best = nullptr;
+  for (const Topic& each : log.topics())
+    if ((text == each.name || text.starts_with(each.name + ":")) && (!best || each.name.size() > best->size()))
+      best = &each.name;
+  if (!best && name.topic.empty()) log.topic(text.substr(0, text.find(':')));  // says what there is
+  if (!best) return name;
+  return {*best, text.size() == best->size() ? "" : text.substr(best->size() + 1)};
+}
+
+/// The unit of a table's columns, where their heads say it.
+std::string unit_in(const Log& log, const MappedSignal& signal) {
+  std::string unit;
+  for (const SignalName& each : signal.from) {
+    const std::string found = log.unit_of(0, each.field);
+    if (!unit.empty() && found != unit) return {};
+    unit = found;
+  }
+  return unit;
+}
+
+/// What nobody has said of units, the heads of columns may say.
+void take_units_of_heads(const Log& log, MappedSignal& signal, const Settings& entry) {
+  const SignalOptions& options = signal.options;
+  const bool has_unit =
+      is_geodetic(options.form) || options.form == SignalForm::heading || options.form == SignalForm::direction;
+  if (options.unit.empty() && !options.scale && !options.counts && !has_unit)
+    if (const std::string unit = unit_in(log, signal); !unit.empty()) {
+      try {
+        set_factor(signal, unit, entry, entry);
+      } catch (const Error& error) {
+        throw Error(fmt::format("{}; the head of the column '{}' of {} says [{}]: give a `unit` if that is wrong",
+                                error.what(), signal.from.front().field, log.name(), unit));
+      }
+    }
+  if (!signal.accuracy || signal.accuracy->is_variance) return;
+  const std::optional<Unit> stated = find_unit(log.unit_of(0, signal.accuracy->of.field));
+  if (stated && stated->si == signal.variable.unit) signal.sigma_factor = options.sigma_scale * stated->factor;
 }
 
 }  // namespace
@@ -186,21 +281,37 @@ const OptionTable<SignalOptions>& SignalOptions::table() {
               "from", &SignalOptions::from,
               "`topic:field`, or the name of a column; several in a list. An item of a list by its index or by name: "
               "`/joint_states:position[rear_left]`. None: the signal of the variable's name")
-          .choice("as", &SignalOptions::form,
-                  {{"value", SignalForm::value},
-                   {"east", SignalForm::east},
-                   {"north", SignalForm::north},
-                   {"up", SignalForm::up},
-                   {"heading", SignalForm::heading},
-                   {"mean", SignalForm::mean},
-                   {"turn", SignalForm::turn}},
-                  "the number itself; latitude, longitude (and height), or a topic with them, in the local plane; the "
-                  "heading of a quaternion; the mean of several; the yaw rate of a left and a right speed")
-          .text("unit", &SignalOptions::unit, "of the signal, e.g. deg, rpm, km/h; none: that of the variable")
+          .choice(
+              "as", &SignalOptions::form,
+              {{"value", SignalForm::value},
+               {"east", SignalForm::east},
+               {"north", SignalForm::north},
+               {"up", SignalForm::up},
+               {"heading", SignalForm::heading},
+               {"mean", SignalForm::mean},
+               {"turn", SignalForm::turn},
+               {"direction", SignalForm::direction},
+               {"yaw_rate", SignalForm::yaw_rate}},
+              "the number itself; latitude, longitude (and height), or a topic with them, in the local plane; the "
+              "heading of a quaternion; the mean of several; the yaw rate of a left and a right speed; the direction "
+              "from one fix to another, or of a vector to the east and north; the yaw rate of an angular velocity")
+          .text("unit", &SignalOptions::unit,
+                "of the signal, e.g. deg, rpm, km/h; none: what the head of the column says, else that of the variable")
           .integer("sign", &SignalOptions::sign, "-1: the signal counts the other way", between(-1, 1))
           .optional_number("scale", &SignalOptions::scale,
                            "what the signal is multiplied by; units are then not checked")
           .number("offset", &SignalOptions::offset, "what is added, in the variable's unit")
+          .optional_number("counts", &SignalOptions::counts,
+                           "of an encoder: how many it counts in one turn of what it is on; makes an angle of them",
+                           greater_than(0.0))
+          .optional_number("wraps", &SignalOptions::wraps,
+                           "of a `derivative`: after how many of its units the signal begins anew, such as 65536 for a "
+                           "counter of 16 bits; 0: never; none: an angle after a turn, unless it has counted more",
+                           at_least(0.0))
+          .numbers(
+              "rpy", &SignalOptions::rpy,
+              "of `as: heading` and `as: yaw_rate`: roll, pitch and yaw of the sensor on the vehicle [rad], as in a "
+              "robot's description")
           .optional_number("radius", &SignalOptions::radius,
                            "of a wheel [m]: makes speeds of its rotation, or the other way round", greater_than(0.0))
           .optional_number("track", &SignalOptions::track, "of `as: turn`: the distance of the two sides [m]",
@@ -288,21 +399,21 @@ void SignalMap::add(const Settings& map, const std::vector<Variable>& variables,
       }
       SignalOptions::table().parse_into(signal.options, keys, is_output ? "an output" : "an input");
       if (signal.options.sign == 0) throw entry->error("sign: found 0, expected 1 or -1");
-      if (signal.options.derivative && is_output)
-        throw entry->error("derivative: is for inputs; expected an output that is measured");
+      check_form(signal, keys);
       // Without `from` it is the signal of the variable's own name, in another unit or with an offset.
       if (keys.find("from") || signal.options.form != SignalForm::value) {
         signal.from = names_in(keys.find("from") ? *keys.find("from") : keys);
-        check_count(signal, *entry);
+        check_count(signal, *entry, false);
       }
       if (!signal.options.when.is_null()) signal.conditions = conditions_in(signal.options.when);
       set_accuracy(signal, keys);
-      check_topics(signal);
-      set_factor(signal, *entry);
-      signal.sigma_factor = signal.options.sigma_scale * std::abs(signal.factor);
+      check_topics(signal, false);
+      const Settings* const unit = keys.find("unit");
+      set_factor(signal, signal.options.unit, unit ? *unit : *entry, *entry);
     }
     signals_.push_back(std::move(signal));
     is_none_.push_back(is_none);
+    entries_.push_back(entry ? *entry : section_);
   }
 }
 
@@ -327,7 +438,12 @@ std::vector<MappedSignal> SignalMap::resolved(const Log& log) const {
       signal.from = {is_table ? SignalName{"", signal.variable.name}
                               : SignalName{own, fmt::format("position[{}]", signal.variable.name)}};
     }
-    check_topics(signal);
+    for (SignalName& each : signal.from) each = resolved_name(each, log, is_table);
+    for (SignalCondition& each : signal.conditions) each.of = resolved_name(each.of, log, is_table);
+    if (signal.accuracy) signal.accuracy->of = resolved_name(signal.accuracy->of, log, is_table);
+    check_count(signal, entries_[i], true);
+    check_topics(signal, true);
+    if (is_table) take_units_of_heads(log, signal, entries_[i]);
     result.push_back(std::move(signal));
   }
   return result;

@@ -6,13 +6,17 @@
 #include <cmath>
 #include <limits>
 
-#include "rhec/core/base/angle.hpp"
 #include "signal_value.hpp"
 
 namespace rhec::logs {
 namespace {
 
 constexpr double no_value = std::numeric_limits<double>::quiet_NaN();
+
+// Two fixes of one vector belong together if their stamps differ by no more than this [s].
+constexpr double same_time = 0.02;
+// An angle beyond so many turns counts them.
+constexpr double turn_counted = 1.000001;
 
 bool waits_for_all(SignalForm form) { return form == SignalForm::mean || form == SignalForm::turn; }
 
@@ -31,8 +35,10 @@ struct SignalStream::Channel {
   MappedSignal signal;
   std::vector<double> fields;
   std::vector<bool> is_fresh;
-  double last = no_value;   ///< of a derivative: the value before
-  double sigma = no_value;  ///< stated in the last record
+  std::vector<Stamp> stamps;  ///< by field
+  bool counts_turns = false;  ///< of a derivative: the angle has been beyond a turn
+  double last = no_value;     ///< of a derivative: the value before
+  double sigma = no_value;    ///< stated in the last record
   Stamp last_stamp = no_stamp, newest = no_stamp;
   SignalCount count;
 };
@@ -108,6 +114,7 @@ void SignalStream::add(const Log& log, MappedSignal signal) {
   note_accuracy(log, signal, type);
   channel.fields.assign(fields.size(), no_value);
   channel.is_fresh.assign(fields.size(), false);
+  channel.stamps.assign(fields.size(), no_stamp);
   channel.count = {signal.variable.name, source_of(signal), signal.is_output};
   channel.signal = std::move(signal);
   channels_.push_back(std::move(channel));
@@ -167,13 +174,27 @@ void SignalStream::read(const Record& record, Reading& reading) {
     }
     // Wheels may come one by one, each in a message of its own: what a message lacks is waited for.
     if (waits_for_all(channel.signal.options.form) && std::isnan(reading.values[use.slot])) continue;
+    if (channel.signal.options.form == SignalForm::direction && !belongs(channel, stamp)) continue;
     channel.fields[use.field] = reading.values[use.slot];
     channel.is_fresh[use.field] = true;
+    channel.stamps[use.field] = stamp;
     channel.newest = std::max(channel.newest, stamp);
     if (std::find(channel.is_fresh.begin(), channel.is_fresh.end(), false) == channel.is_fresh.end())
       complete(channel, channel.newest);
   }
   for (auto& [key, row] : completed_) rows_.push_back(std::move(row));
+}
+
+/// Forgets parts that are older than a new one; false if the new one is older than they are.
+bool SignalStream::belongs(Channel& channel, Stamp stamp) {
+  bool is_behind = false;
+  for (std::size_t i = 0; i < channel.fields.size(); ++i) {
+    if (!channel.is_fresh[i]) continue;
+    const double ahead = seconds_between(channel.stamps[i], stamp);
+    if (ahead > same_time) channel.is_fresh[i] = false;
+    is_behind = is_behind || ahead < -same_time;
+  }
+  return !is_behind;
 }
 
 /// All that makes up a signal has come.
@@ -190,15 +211,28 @@ void SignalStream::complete(Channel& channel, Stamp stamp) {
   if (!channel.signal.options.derivative) return put(channel, measured, value);
   const double duration = channel.last_stamp == no_stamp ? 0.0 : seconds_between(channel.last_stamp, measured);
   if (duration > 0.0) {
-    const double change = channel.signal.is_angle ? angle_difference(value, channel.last) : value - channel.last;
-    const double rate = change / duration + channel.signal.options.offset;
-    // It was so since the last record, and is taken to stay so.
-    put(channel, channel.last_stamp, rate);
-    put(channel, measured, rate);
+    const double rate = change_since_last(channel, value) / duration + channel.signal.options.offset;
+    if (channel.signal.is_output) {  // the mean since the last record
+      put(channel, channel.last_stamp + (measured - channel.last_stamp) / 2, rate);
+    } else {  // it was so since the last record, and is taken to stay so
+      put(channel, channel.last_stamp, rate);
+      put(channel, measured, rate);
+    }
   }
   if (channel.last_stamp != no_stamp && duration <= 0.0) return;
   channel.last = value;
   channel.last_stamp = measured;
+}
+
+/// What begins anew has gone the shorter way. An angle begins anew after a turn, unless it has been beyond one.
+double SignalStream::change_since_last(Channel& channel, double value) {
+  const MappedSignal& signal = channel.signal;
+  const double change = value - channel.last;
+  const bool is_told = signal.options.wraps.has_value();
+  if (!is_told && std::max(std::abs(value), std::abs(channel.last)) > turn_counted * signal.period)
+    channel.counts_turns = true;
+  if (!(signal.period > 0.0) || (!is_told && channel.counts_turns)) return change;
+  return change - signal.period * std::round(change / signal.period);
 }
 
 void SignalStream::put(Channel& channel, Stamp stamp, double value) {

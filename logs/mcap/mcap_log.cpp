@@ -41,14 +41,14 @@ Chunk chunk_of(std::span<const std::byte> content) {
 class McapLog final : public MessageLog {
  public:
   McapLog(const std::filesystem::path& file, const MessageLogOptions& options)
-      : MessageLog(file.string(), options), file_(file) {
+      : MessageLog(options.name.empty() ? file.string() : options.name, options), file_(file) {
     InputFile input(file_);
     std::vector<std::byte> magic(mcap_magic.size());
     if (!input.read(magic) || !begins_with(magic, mcap_magic))
       throw Error(fmt::format("{}: found no MCAP, which begins with its magic bytes; give an MCAP file", name()));
     if (!read_summary(input)) walk(input, {.learner = this});
     for (const auto& [channel, count] : counts_)
-      if (const auto found = channels_.find(channel); found != channels_.end()) add_count(found->second, count);
+      if (const auto found = channels_.find(channel); found != channels_.end()) add_count(found->second.topic, count);
   }
 
   std::optional<Damage> read(const std::vector<bool>& wanted, const Take& take) const override {
@@ -174,7 +174,7 @@ class McapLog final : public MessageLog {
     McapLog* learner = nullptr;
     const std::vector<bool>* wanted = nullptr;
     const Take* take = nullptr;
-    std::vector<std::byte> content = {}, records = {};
+    std::vector<std::byte> content = {}, records = {}, message = {};
     std::optional<Damage> damage = {};  ///< the first
     bool is_over = false;
 
@@ -228,8 +228,8 @@ class McapLog final : public MessageLog {
 
   bool is_wanted(std::uint16_t channel, const Walk& state) const {
     const auto found = channels_.find(channel);
-    return found != channels_.end() && static_cast<std::size_t>(found->second) < state.wanted->size() &&
-           (*state.wanted)[static_cast<std::size_t>(found->second)];
+    return found != channels_.end() && static_cast<std::size_t>(found->second.topic) < state.wanted->size() &&
+           (*state.wanted)[static_cast<std::size_t>(found->second.topic)];
   }
 
   /// Whether the index says that nothing in a chunk is asked for.
@@ -284,16 +284,26 @@ class McapLog final : public MessageLog {
     if (!reader.ok()) return;
     if (state.learner) ++state.learner->counts_[channel];
     if (!state.take || !is_wanted(channel, state)) return;
-    const Record record{.topic = channels_.at(channel),
-                        .received = static_cast<Stamp>(std::min<std::uint64_t>(log_time, INT64_MAX)),
-                        .place = place,
-                        .bytes = reader.take(reader.left())};
+    const Place& at = channels_.at(channel);
+    Record record{.topic = at.topic,
+                  .received = static_cast<Stamp>(std::min<std::uint64_t>(log_time, INT64_MAX)),
+                  .place = place,
+                  .form = at.form,
+                  .bytes = reader.take(reader.left())};
+    if (is_zstd(record.bytes)) {  // CDR begins otherwise
+      const std::string wrong = decompress(Compression::zstd, record.bytes, longest_record, state.message);
+      if (!wrong.empty()) {
+        if (!state.damage) state.damage = damage(place, fmt::format("a message is damaged: {}", wrong));
+        return;
+      }
+      record.bytes = state.message;
+    }
     if (!(*state.take)(record)) state.is_over = true;
   }
 
   std::filesystem::path file_;
   std::map<std::uint16_t, Schema> schemas_;
-  std::map<std::uint16_t, int> channels_;                   ///< their topics
+  std::map<std::uint16_t, Place> channels_;                 ///< their topics
   std::map<std::uint16_t, std::int64_t> counts_;            ///< messages, by channel
   std::map<std::int64_t, std::set<std::uint16_t>> chunks_;  ///< channels in a chunk, by its place
 };

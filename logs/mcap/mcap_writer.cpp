@@ -42,7 +42,8 @@ std::uint16_t McapWriter::add_channel(const std::string& topic, const std::strin
                                       const std::string& definition) {
   if (channels_.size() >= std::numeric_limits<std::uint16_t>::max())
     throw Error(fmt::format("{}: has {} topics; expected fewer", file_.path().string(), channels_.size()));
-  const auto [schema, is_new] = schema_ids_.try_emplace(type, static_cast<std::uint16_t>(schemas_.size() + 1));
+  const auto [schema, is_new] =
+      schema_ids_.try_emplace(std::pair(type, definition), static_cast<std::uint16_t>(schemas_.size() + 1));
   if (is_new) {
     ByteWriter content;
     content.u16(schema->second);

@@ -6,6 +6,7 @@
 #include <set>
 #include <utility>
 
+#include "db3_pages.hpp"
 #include "rhec/logs/rosbag2/rosbag2.hpp"
 #include "rhec/logs/storage/compression.hpp"
 
@@ -35,10 +36,17 @@ std::span<const std::byte> bytes_at(sqlite3_stmt* query, int column) {
   return {bytes, bytes ? static_cast<std::size_t>(sqlite3_column_bytes(query, column)) : 0};
 }
 
+std::string in_uri(const std::string& path) {
+  std::string text;
+  for (const char c : path)
+    text += c == '%' || c == '?' || c == '#' ? fmt::format("%{:02X}", static_cast<int>(c)) : std::string(1, c);
+  return text;
+}
+
 class Db3Log final : public MessageLog {
  public:
   Db3Log(const std::filesystem::path& file, const MessageLogOptions& options)
-      : MessageLog(file.string(), options), file_(file) {
+      : MessageLog(options.name.empty() ? file.string() : options.name, options), file_(file) {
     const Database database = open();
     const std::set<std::string> tables = tables_of(database.get());
     if (!tables.contains("topics") || !tables.contains("messages"))
@@ -52,7 +60,7 @@ class Db3Log final : public MessageLog {
     const Database database = open();
     std::string of_topics;
     for (const auto& [id, topic] : topic_of_id_)
-      if (static_cast<std::size_t>(topic) < wanted.size() && wanted[static_cast<std::size_t>(topic)])
+      if (static_cast<std::size_t>(topic.topic) < wanted.size() && wanted[static_cast<std::size_t>(topic.topic)])
         of_topics += fmt::format("{}{}", of_topics.empty() ? "" : ",", id);
     if (of_topics.empty()) return std::nullopt;
     // In the order of the file, which is that of arrival: sorting would take a large bag's memory.
@@ -60,25 +68,25 @@ class Db3Log final : public MessageLog {
         prepare(database.get(), fmt::format("SELECT id, topic_id, timestamp, data FROM messages WHERE topic_id IN ({}) "
                                             "ORDER BY id",
                                             of_topics));
-    std::vector<std::byte> decompressed;
-    Record record;
-    int code = SQLITE_OK;
-    while ((code = sqlite3_step(query.get())) == SQLITE_ROW) {
-      const auto topic = topic_of_id_.find(sqlite3_column_int64(query.get(), 1));
-      if (topic == topic_of_id_.end()) continue;
-      record.topic = topic->second;
-      record.place = sqlite3_column_int64(query.get(), 0);
-      record.received = sqlite3_column_int64(query.get(), 2);
-      record.bytes = bytes_at(query.get(), 3);
-      if (is_zstd(record.bytes)) {
-        const std::string wrong = decompress(Compression::zstd, record.bytes, longest_value, decompressed);
-        if (!wrong.empty()) return damage(record.place, wrong);
-        record.bytes = decompressed;
+    Reading reading{.take = take};
+    std::int64_t newest = 0;
+    std::string what = "the file is cut";
+    Db3Pages pages(file_);
+    if (!pages.is_cut_within_page()) {
+      int code = SQLITE_OK;
+      while ((code = sqlite3_step(query.get())) == SQLITE_ROW) {
+        newest = sqlite3_column_int64(query.get(), 0);
+        hand_out({newest, sqlite3_column_int64(query.get(), 1), sqlite3_column_int64(query.get(), 2),
+                  bytes_at(query.get(), 3)},
+                 reading);
+        if (reading.is_over) return std::move(reading.damage);
       }
-      if (!take(record)) return std::nullopt;
+      if (code == SQLITE_DONE) return unfinished();
+      what = sqlite3_errmsg(database.get());
     }
-    if (code != SQLITE_DONE) return damage(record.place, sqlite3_errmsg(database.get()));
-    return std::nullopt;
+    const std::int64_t saved = hand_out_pages(pages, newest, wanted, reading);
+    if (reading.is_over) return std::move(reading.damage);
+    return damage(newest, what, saved);
   }
 
   Damage damage_at(const Record& record, const RecordError& error) const override {
@@ -87,16 +95,75 @@ class Db3Log final : public MessageLog {
   }
 
  private:
-  Damage damage(std::int64_t after, std::string_view what) const {
+  struct Reading {
+    const Take& take;
+    std::vector<std::byte> decompressed = {};
+    std::optional<Damage> damage = {};
+    bool is_over = false;
+  };
+
+  void hand_out(const Db3Row& row, Reading& reading) const {
+    const auto topic = topic_of_id_.find(row.topic_id);
+    if (topic == topic_of_id_.end()) return;
+    Record record{.topic = topic->second.topic,
+                  .received = row.timestamp,
+                  .place = row.id,
+                  .form = topic->second.form,
+                  .bytes = row.data};
+    if (is_zstd(record.bytes)) {
+      const std::string wrong = decompress(Compression::zstd, record.bytes, longest_value, reading.decompressed);
+      if (!wrong.empty()) {
+        reading.damage = damage(record.place, wrong);
+        reading.is_over = true;
+        return;
+      }
+      record.bytes = reading.decompressed;
+    }
+    reading.is_over = !reading.take(record);
+  }
+
+  /// What SQLite's tree does not lead to any more. Returns how many messages that are.
+  std::int64_t hand_out_pages(Db3Pages& pages, std::int64_t after, const std::vector<bool>& wanted,
+                              Reading& reading) const {
+    std::int64_t count = 0;
+    pages.read(after, [&](const Db3Row& row) {
+      const auto topic = topic_of_id_.find(row.topic_id);
+      if (topic == topic_of_id_.end() || !wanted[static_cast<std::size_t>(topic->second.topic)]) return true;
+      ++count;
+      hand_out(row, reading);
+      return !reading.is_over;
+    });
+    return count;
+  }
+
+  Damage damage(std::int64_t after, std::string_view what, std::int64_t saved = 0) const {
+    const std::string found = saved > 0 ? fmt::format(", and {} behind it that were found page by page", saved) : "";
     return {
-        fmt::format("{}: behind message {}: {}; the messages up to there are used; `ros2 bag reindex` or SQLite's "
+        fmt::format("{}: behind message {}: {}; the messages up to there are used{}; `ros2 bag reindex` or SQLite's "
                     "`.recover` may save more",
-                    name(), after, what)};
+                    name(), after, what, found)};
+  }
+
+  /// The file that SQLite undoes an unfinished change with, which would be writing.
+  std::filesystem::path journal() const { return file_.string() + "-journal"; }
+  bool has_journal() const {
+    std::error_code none;
+    return std::filesystem::file_size(journal(), none) > 0 && !none;
+  }
+  std::optional<Damage> unfinished() const {
+    if (!has_journal()) return std::nullopt;
+    return Damage{
+        fmt::format("{}: its recorder was ended while it wrote, as {} shows; the last messages may be missing", name(),
+                    journal().filename().string())};
   }
 
   Database open() const {
     sqlite3* opened = nullptr;
-    const int code = sqlite3_open_v2(file_.c_str(), &opened, SQLITE_OPEN_READONLY | SQLITE_OPEN_NOMUTEX, nullptr);
+    // Beside a journal SQLite refuses to read what it may not mend, unless it is told that nobody writes any more.
+    const std::string place =
+        has_journal() ? "file:" + in_uri(std::filesystem::absolute(file_).string()) + "?immutable=1" : file_.string();
+    const int flags = SQLITE_OPEN_READONLY | SQLITE_OPEN_NOMUTEX | (has_journal() ? SQLITE_OPEN_URI : 0);
+    const int code = sqlite3_open_v2(place.c_str(), &opened, flags, nullptr);
     Database database(opened);
     if (code != SQLITE_OK) throw failure(opened);
     // A file is data: nothing in it is to be run, and nothing in it is as long as SQLite allows.
@@ -108,6 +175,11 @@ class Db3Log final : public MessageLog {
   }
 
   Error failure(sqlite3* database) const {
+    if (std::filesystem::exists(file_.string() + "-wal"))
+      return Error(
+          fmt::format("{0}: {1}; copy it, together with {0}-wal, into a folder that can be written, since what was "
+                      "recorded last lies there",
+                      name(), sqlite3_errmsg(database)));
     return Error(fmt::format("{}: {}; expected a bag of rosbag2 (.db3)", name(), sqlite3_errmsg(database)));
   }
 
@@ -156,7 +228,7 @@ class Db3Log final : public MessageLog {
 
   std::filesystem::path file_;
   std::map<std::string, MessageEncoding> definitions_;
-  std::map<std::int64_t, int> topic_of_id_;
+  std::map<std::int64_t, Place> topic_of_id_;
 };
 
 }  // namespace

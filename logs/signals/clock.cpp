@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <system_error>
 
+#include "rhec/logs/signals/calendar.hpp"
+
 namespace rhec::logs {
 namespace {
 
@@ -52,9 +54,9 @@ std::optional<Stamp> exact(std::string_view text, std::int64_t unit) noexcept {
 
 std::optional<ClockUnit> clock_unit(std::string_view unit) noexcept {
   if (unit.empty()) return 0.0;
-  if (unit == "s" || unit == "sec") return second;
+  if (unit == "s" || unit == "sec" || unit == "seconds") return second;
   if (unit == "ms") return millisecond;
-  if (unit == "us") return microsecond;
+  if (unit == "us" || unit == "\xC2\xB5s") return microsecond;
   if (unit == "ns") return 1.0;
   return std::nullopt;
 }
@@ -63,7 +65,8 @@ std::optional<Stamp> stamp_of(std::string_view text, ClockUnit unit) noexcept {
   if (text.starts_with('+')) text.remove_prefix(1);
   double count = 0.0;
   const auto [end, failure] = std::from_chars(text.data(), text.data() + text.size(), count);
-  if (failure != std::errc() || end != text.data() + text.size() || !std::isfinite(count)) return std::nullopt;
+  if (failure != std::errc() || end != text.data() + text.size()) return calendar_stamp(text);
+  if (!std::isfinite(count)) return std::nullopt;
   if (unit == 0.0) unit = unit_by_size(count);
   if (const std::optional<Stamp> stamp = exact(text, static_cast<std::int64_t>(unit))) return stamp;
   return stamp_of(count, unit);

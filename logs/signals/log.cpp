@@ -20,6 +20,8 @@ int Log::topic(std::string_view name) const {
   throw Error(fmt::format("{} has no topic '{}'{}", name_, name, suggestion_for(name, known)));
 }
 
+std::string Log::unit_of(int, std::string_view) const { return {}; }
+
 SignalName parse_signal_name(std::string_view text) {
   const std::size_t colon = text.find(':');
   if (colon != std::string_view::npos && text.starts_with('/'))

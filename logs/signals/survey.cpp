@@ -46,7 +46,14 @@ class Taker {
     if (result_.count == 0) prepare(record);
     Stamp measured = record.received;
     if (reader_) {
-      measured = reader_->read(record, values_.data());
+      try {
+        measured = reader_->read(record, values_.data());
+      } catch (const RecordError& error) {
+        if (result_.topic.name.empty()) throw;  // a table has no other topics
+        ++result_.count;
+        if (result_.broken++ == 0) result_.first_broken = log_.damage_at(record, error).what;
+        return;
+      }
       for (std::size_t i = 0; i < values_.size(); ++i) take(values_[i], result_.fields[i]);
     }
     if (result_.count++ == 0) result_.first = measured;
@@ -81,7 +88,8 @@ class Taker {
       return;
     }
     values_.resize(request.fields.size());
-    for (const std::string& field : request.fields) result_.fields.push_back({.name = field});
+    for (const std::string& field : request.fields)
+      result_.fields.push_back({.name = field, .unit = log_.unit_of(record.topic, field)});
   }
 
   static void take(double value, FieldSurvey& field) noexcept {

@@ -143,8 +143,9 @@ std::string ZstdStream::decompress(std::span<const std::byte> block, std::vector
     bytes.resize(used + first_room);
     ZSTD_outBuffer to{bytes.data() + used, first_room, 0};
     const std::size_t result = ZSTD_decompressStream(static_cast<ZSTD_DCtx*>(context_), &to, &from);
-    if (ZSTD_isError(result)) return ZSTD_getErrorName(result);
     bytes.resize(used + to.pos);
+    if (ZSTD_isError(result)) return ZSTD_getErrorName(result);
+    is_within_frame_ = result != 0;
     is_full = to.pos == first_room;
   }
   return {};

@@ -23,6 +23,9 @@ constexpr double missing = std::numeric_limits<double>::quiet_NaN();
 constexpr double same_time = 1e-6;
 // Longer than this without anything is the end of a drive, or a broken stamp [s].
 constexpr double longest_silence = 3600.0;
+// In a longer silence nothing is estimated: each estimate goes on from the last measurement, and takes longer than the
+// one before it.
+constexpr double longest_blind = 60.0;
 constexpr double most_estimates = 2e7;
 
 std::vector<Sensor> sensors_of(const Robot& robot) {
@@ -128,6 +131,7 @@ class Driver {
       note(time);
       if (hooks_.progress) hooks_.progress(std::min(1.0, (time - start) / std::max(step, end - start)));
       if (next_ == drive_.events.size() && time > end - step + same_time) break;
+      k = behind_silence(k, start, step);
       estimator_->prepare();
     }
     predict_until(infinity);
@@ -139,6 +143,15 @@ class Driver {
   }
 
  private:
+  /// The last of the times that a long silence leaves out; `k`, where there is none.
+  std::int64_t behind_silence(std::int64_t k, double start, double step) const {
+    if (next_ == 0 || next_ == drive_.events.size()) return k;
+    const double last = drive_.events[next_ - 1].arrival, next = drive_.events[next_].arrival;
+    const double time = start + static_cast<double>(k) * step;
+    if (next - last < longest_blind || time - last < longest_blind) return k;
+    return std::max(k, static_cast<std::int64_t>(std::ceil((next - start) / step)) - 1);
+  }
+
   void check_length(double start, double end, double step) const {
     double last = start;
     for (const logs::DriveEvent& event : drive_.events) {

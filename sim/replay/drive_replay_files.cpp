@@ -118,7 +118,16 @@ std::string drive_estimates_csv(const std::vector<DriveResult>& results, const R
 
 std::string measurements_csv(const DriveResult& result, const Robot& robot, const logs::Drive& drive) {
   std::string text = "time,received";
-  append_header("", robot.model()->description().outputs, text);
+  const std::vector<Variable>& outputs = robot.model()->description().outputs;
+  append_header("", outputs, text);
+  std::vector<std::size_t> stating;
+  for (std::size_t j = 0; j < outputs.size(); ++j)
+    if (std::ranges::any_of(drive.signals, [&](const logs::SignalCount& each) {
+          return each.is_output && each.stated > 0 && each.variable == outputs[j].name;
+        })) {
+      stating.push_back(j);
+      text += ",sigma_" + outputs[j].name;
+    }
   text += ",held_out\n";
   std::vector<bool> is_held_out(drive.events.size());
   for (const DrivePrediction& prediction : result.withheld.predictions) is_held_out[prediction.event] = true;
@@ -127,6 +136,8 @@ std::string measurements_csv(const DriveResult& result, const Robot& robot, cons
     if (!event.is_output) continue;
     fmt::format_to(std::back_inserter(text), "{:.10g},{:.10g}", event.time, event.arrival);
     for (int j = 0; j < drive.outputs; ++j) append(drive.values_of(event)[j], text);
+    const double* sigmas = drive.sigmas_of(event);
+    for (const std::size_t j : stating) append(sigmas ? sigmas[j] : std::nan(""), text);
     fmt::format_to(std::back_inserter(text), ",{:d}\n", bool{is_held_out[i]});
   }
   return text;

@@ -4,6 +4,7 @@
     log.py <rhec>
 """
 import csv
+import datetime
 import json
 import math
 import pathlib
@@ -64,6 +65,54 @@ def stranger_table(path):
         y += step * TRACTION * speed * math.sin(middle)
         heading += step * TURNING * turn
     path.write_text("\n".join(rows) + "\n")
+
+
+SPRAYER = """\
+name: sprayer
+step: 0.1
+model: {name: bicycle_slip, wheelbase: 2.5, gps_offset: -1.0, outputs: [x_gps, y_gps, heading, delta, ground_speed]}
+noise:
+  outputs: {x_gps: 0.02, y_gps: 0.02, heading: 0.02, delta: 0.01, ground_speed: 0.05}
+estimator: {name: ekf, initial: {sigma: {x_pos: 0.5, y_pos: 0.5, beta: 0.3, delta: 0.1, kappa: 0.3, mu: 0.3}}}
+signals:
+  outputs:
+    x_gps: {from: ["GPS vorn Lat", "GPS vorn Lon"], as: east}
+    y_gps: {from: ["GPS vorn Lat", "GPS vorn Lon"], as: north}
+    heading: {from: ["GPS hinten Lat", "GPS hinten Lon", "GPS vorn Lat", "GPS vorn Lon"], as: direction}
+    delta: {from: "Steer sensor, left", sign: -1, offset: 0.05236}
+    ground_speed: Radar speed
+  inputs:
+    u1: {from: ["rpm left", "rpm right"], as: mean, radius: 0.6}
+    u2: {from: "Steer sensor, left", sign: -1, derivative: true}
+"""
+
+
+def sprayer_table(path):
+    """The wheels slip by 15 %; 10 Hz, fixes at 2 Hz, in local time."""
+    noise, radius, slip = random.Random(4), 0.6, 0.85
+    start = datetime.datetime(2024, 5, 1, 12, tzinfo=datetime.timezone(datetime.timedelta(hours=2)))
+    rows = ["sep=;", '"Zeit";"GPS vorn Lat (°)";"GPS vorn Lon (°)";"GPS hinten Lat (°)";"GPS hinten Lon (°)";"Radar speed [km/h]";"Radar sigma [m/s]";'
+            '"Steer sensor, left [°]";"rpm left [1/min]";"rpm right [1/min]";"ticks left";"ticks right";"Bemerkung"']
+    x, y, heading, step = 0.0, 0.0, 0.4, 0.01
+
+    def place(ahead):
+        east, north = (value + noise.gauss(0, 0.01) for value in (x + ahead * math.cos(heading), y + ahead * math.sin(heading)))
+        return [f"{48.0 + math.degrees(north / 6366700.0):.9f}", f"{11.0 + math.degrees(east / (6389800.0 * math.cos(math.radians(48.0)))):.9f}"]
+
+    for k in range(6000):
+        steering, speed = 0.25 * math.sin(0.3 * step * k), 2.0
+        if k % 10 == 0:
+            time = (start + datetime.timedelta(seconds=step * k)).isoformat(timespec="milliseconds")
+            fixes = place(1.0) + place(-1.0) if k % 50 == 0 else [""] * 4
+            wheel = f"{speed / radius * 60.0 / (2.0 * math.pi):.2f}"
+            ticks = str(int(speed * step * k / radius / (2.0 * math.pi) * 81920) % 65536)
+            cells = [time, *fixes, f"{3.6 * slip * speed + noise.gauss(0, 0.1):.3f}", "0.05", f"{3.0 - math.degrees(steering) + noise.gauss(0, 0.1):.3f}",
+                     wheel, wheel, ticks, ticks]
+            rows.append(";".join([time] + [cell.replace(".", ",") for cell in cells[1:]] + ['"gut; weiter"']))
+        x += step * slip * speed * math.cos(heading)
+        y += step * slip * speed * math.sin(heading)
+        heading += step * slip * speed * math.tan(steering) / 2.5
+    path.write_bytes(b"\xef\xbb\xbf" + "\r\n".join(rows).encode() + b"\r\n")
 
 
 class Suite(Findings):
@@ -128,6 +177,33 @@ class Suite(Findings):
         proposal = self.run("log", log, "--vehicle", "unicycle_traction").stdout
         self.expect("{from: [lat, lon, height], as: east}" in proposal, "a proposal for columns", proposal)
 
+    def sprayer(self):
+        """A table as a spreadsheet in Europe saves it: commas, dates, units in heads, counts, two antennas, a sensor that counts the other way."""
+        robot, log = self.work / "sprayer.yaml", self.work / "sprayer.csv"
+        robot.write_text(SPRAYER)
+        sprayer_table(log)
+        proposal = self.run("log", log, "--vehicle", robot).stdout
+        for line in ('x_gps: {from: ["GPS vorn Lat", "GPS vorn Lon"], as: east}', 'delta: "Steer sensor, left"', 'ground_speed: "Radar speed"',
+                     'u1: {from: ["rpm left", "rpm right"], as: mean, radius: 0.3}', "Radar speed [km/h]"):
+            self.expect(line in proposal, "a proposal for a sprayer", f"no {line} in {proposal}")
+        proposed = self.work / "proposed.yaml"
+        proposed.write_text(SPRAYER.split("signals:")[0] + proposal[proposal.index("signals:"):])
+        self.run("estimate", proposed, log, "--out", self.work / "proposed")
+        told = json.loads(self.run("log", log, "--json").stdout)["topics"][0]
+        self.expect({field["name"]: field.get("unit") for field in told["fields"]}.get("rpm left") == "rpm" and told["broken"] == 0, "units as JSON", f"{told}")
+        counts = 'signals.inputs.u1={from: ["ticks left", "ticks right"], as: mean, counts: 81920, wraps: 65536, radius: 0.6, derivative: true}'
+        for settings in ((), ("--set", counts)):
+            self.run("estimate", robot, log, *settings, "--out", self.work / "sprayer")
+            last = self.rows("sprayer")[-1]
+            self.expect(abs(float(last["kappa"]) - 0.85) < 0.03, "slip of a sprayer", f"{last}")
+            summary = json.loads((self.work / "sprayer" / "summary.json").read_text())["variants"]["sprayer"]
+            self.expect(summary["held_out"]["median"] < 0.04, "accuracy of a sprayer", f"{summary['held_out']}")
+        self.run("estimate", robot, log, "--set", "signals.outputs.ground_speed={from: Radar speed, sigma: Radar sigma}", "--out", self.work / "sprayer")
+        measured = self.rows("sprayer", "measurements.csv")
+        self.expect({row["sigma_ground_speed"] for row in measured if row["ground_speed"]} == {"0.05"}, "stated deviations", f"{measured[0]}")
+        self.expect("sigma_x_gps" not in measured[0], "stated deviations", "of a sensor that states none")
+        self.refused("the head of the column 'Steer sensor, left'", "estimate", robot, log, "--set", "signals.outputs.ground_speed='Steer sensor, left'", "--out", self.work / "no")
+
     def mistakes(self):
         robot, log = self.work / "robot.yaml", self.work / "field.csv"
         estimate = ["--out", self.work / "no"]
@@ -162,6 +238,7 @@ def main():
         suite = Suite(Program(sys.argv[1]), work)
         suite.vehicles()
         suite.stranger()
+        suite.sprayer()
         suite.mistakes()
     finally:
         shutil.rmtree(work)

@@ -124,6 +124,17 @@ def silence_stops_the_robot(rhec, findings):
     findings.expect(node_code == NOT_SOLVED, "--once without the end", f"{node_code}: {node_text}")
 
 
+def two_nodes_do_not_steer_one_robot(rhec, findings):
+    """Each tells that the other one commands, too; a node that is steered by hand before it drives says nothing."""
+    with Domain() as domain:
+        robot = domain.start(rhec, "ros", ROBOT, "--simulate", "--seconds", 5)
+        nodes = [domain.start(rhec, "ros", ROBOT, "--seconds", 5, *assignments(f"ros.node=node{i}", "ros.frames.publish=false")) for i in range(2)]
+        texts = [end_of(node, 30)[1] for node in nodes]
+        end_of(robot, 30)
+    for text in texts:
+        findings.expect(text.count("another node commands on /cmd_vel, too") == 1, "two nodes that steer", text)
+
+
 def who_does_not_steer(rhec, findings):
     with Domain() as domain:
         robot = domain.start(rhec, "ros", ROBOT, "--simulate", "--seconds", 4, "--json")
@@ -206,7 +217,7 @@ def main():
     without_the_node(rhec, findings)
     mistakes(rhec, findings)
     # They wait more than they compute, each in a domain of its own.
-    drives = (commands_of_the_page, a_stopped_node_stops_the_robot, silence_stops_the_robot, who_does_not_steer)
+    drives = (commands_of_the_page, a_stopped_node_stops_the_robot, silence_stops_the_robot, two_nodes_do_not_steer_one_robot, who_does_not_steer)
     with concurrent.futures.ThreadPoolExecutor(len(drives)) as pool:
         for drive in [pool.submit(drive, rhec, findings) for drive in drives]:
             drive.result()

@@ -37,6 +37,9 @@ void collect(const Settings& value, std::vector<std::pair<std::string, Settings>
     if (topic.empty())
       throw value.error(
           fmt::format("found '{}', a column; expected /topic:field, since a live node has no tables", value.text()));
+    if (!is_topic_name(topic))
+      throw value.error(
+          fmt::format("found the topic '{}', expected a full name, such as /fix, of letters, digits, _ and /", topic));
     if (std::ranges::none_of(topics, [&](const auto& each) { return each.first == topic; }))
       topics.emplace_back(topic, value);
   }

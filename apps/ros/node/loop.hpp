@@ -119,6 +119,7 @@ class Loop {
   void cycle();
   Driving judge(const Estimate& estimate, Clock::time_point now) const;
   void send_command(const Estimate& estimate, logs::Stamp when, const Controller::Command* command);
+  void note_rival_command();
   void look_for_rival(const std::vector<PlaceOfFrame>& transforms);
   void tell(const Estimate& estimate, logs::Stamp when, double time, const Controller::Command* command);
   void tell_health(const Estimate& estimate, logs::Stamp when);
@@ -172,8 +173,10 @@ class Loop {
   logs::Stamp obstacles_stamp_ = 0;
   bool has_told_crowd_ = false;
   double last_x_ = 0.0, last_y_ = 0.0;  ///< where the vehicle was estimated last [m]
-  bool has_rival_ = false;              ///< since health was told last, another node has sent this one's transform
-  std::string rival_parent_;            ///< from which frame
+  bool has_rival_command_ = false;      ///< the same of a command, while this node steers
+  bool has_told_rival_command_ = false;
+  bool has_rival_ = false;    ///< since health was told last, another node has sent this one's transform
+  std::string rival_parent_;  ///< from which frame
   Driving driving_ = Driving::waiting;
   HealthLevel told_level_ = HealthLevel::ok;
   LoopReport report_;

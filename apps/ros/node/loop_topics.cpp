@@ -12,7 +12,7 @@ namespace rhec::apps::ros {
 namespace {
 
 /// Topics that are heard and are no measurements.
-enum class Other : int { path, obstacles, stop, clock, transforms };
+enum class Other : int { path, obstacles, stop, clock, transforms, commands };
 
 WireTopic topic_of(const std::string& name, const std::string& type) {
   return {name, type, type_hash(type, logs::builtin_definitions())};
@@ -45,6 +45,7 @@ void Loop::subscribe(const LiveTopics& topics) {
     hear(Other::obstacles, options_.names.obstacles, type_of(options_.obstacles.form), Delivery::latest);
     // A stop is heard from everybody, reliable or not.
     hear(Other::stop, options_.names.stop, "std_msgs/msg/Bool", Delivery::latest);
+    hear(Other::commands, options_.names.command, command_message_.type(), Delivery::latest);
   }
   if (options_.frames.publish)
     hear(Other::transforms, options_.names.transforms, "tf2_msgs/msg/TFMessage", Delivery::latest);
@@ -117,6 +118,9 @@ void Loop::hear_special(int which, const Arrival& arrival) {
       case Other::transforms:
         look_for_rival(read_transforms(message));
         return;  // others' business, and much of it
+      case Other::commands:
+        note_rival_command();
+        return;
     }
     ++count.used;
   } catch (const logs::RecordError& error) {
@@ -136,6 +140,17 @@ void Loop::look_for_rival(const std::vector<PlaceOfFrame>& transforms) {
     rival_parent_ = transform.parent;
     has_rival_ = true;
   }
+}
+
+/// Before this node's first command somebody else may drive the vehicle on the same topic.
+void Loop::note_rival_command() {
+  if (!has_driven_) return;
+  if (!has_told_rival_command_)
+    say(
+        fmt::format("another node commands on {}, too, and the robot does what came last; one of both must not: "
+                    "ros.command.steer: false",
+                    options_.names.command));
+  has_told_rival_command_ = has_rival_command_ = true;
 }
 
 void Loop::tell(const Estimate& estimate, logs::Stamp when, double time, const Controller::Command* command) {
@@ -180,7 +195,10 @@ void Loop::tell_health(const Estimate& estimate, logs::Stamp when) {
                                    : rhec::name_of(estimate.health.level);
   const bool has_rival = std::exchange(has_rival_, false);
   if (has_rival) values.push_back({"transform", "sent by another node, too, from " + rival_parent_});
-  const bool is_error = estimate.health.level == HealthLevel::lost || driving_ == Driving::silent || has_rival;
+  const bool has_rival_command = std::exchange(has_rival_command_, false);
+  if (has_rival_command) values.push_back({"commands", "sent by another node, too"});
+  const bool is_error =
+      estimate.health.level == HealthLevel::lost || driving_ == Driving::silent || has_rival || has_rival_command;
   const std::uint8_t level = is_error ? 2 : estimate.health.level == HealthLevel::degraded ? 1 : 0;
   message_.clear();
   sim::write_diagnostics(when, level, options_.node + ": estimate", findings + "; " + in_words(driving_), values,

@@ -32,10 +32,11 @@ SensorMessages::SensorMessages(const LiveTopics& topics, const logs::SignalMap& 
     topic_of_.push_back(topics.topic(signal.from.front().topic));
     const bool is_parted =
         (is_geodetic(signal.options.form) || signal.options.form == SignalForm::heading) && signal.from.size() != 1;
-    if (signal.options.derivative || is_parted)
+    const bool is_turned = signal.options.form == SignalForm::direction || !signal.options.rpy.empty();
+    if (signal.options.derivative || is_parted || is_turned)
       throw Error(
           fmt::format("signals: {}: a simulated robot cannot publish what this is made of; expected a signal "
-                      "without derivative, of a topic as a whole",
+                      "without derivative, direction and rpy, of a topic as a whole",
                       signal.variable.name));
     writers_.try_emplace({topic_of_.back(), signal.options.delay}, topics.message_type(topic_of_.back()));
   }
@@ -83,6 +84,9 @@ void SensorMessages::set(const logs::MappedSignal& signal, double value, Message
       message.set(prefix_of(signal.from.front()) + "z", std::sin(0.5 * value));
       message.set(prefix_of(signal.from.front()) + "w", std::cos(0.5 * value));
       return;
+    case SignalForm::yaw_rate:
+      return message.set(prefix_of(signal.from.front()) + "z", value);
+    case SignalForm::direction:  // refused
     case SignalForm::east:
     case SignalForm::north:
     case SignalForm::up:

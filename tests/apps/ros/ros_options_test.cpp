@@ -25,6 +25,10 @@ TEST(RosOptions, NamesTheLineOfAMistake) {
               ThrowsMessage<Error>(HasSubstr("robot.yaml:2")));
   EXPECT_THAT([] { read_ros_options(section("node: x\nnames:\n  stop: stop")); },
               ThrowsMessage<Error>(AllOf(HasSubstr("robot.yaml:3"), HasSubstr("expected a full name"))));
+  for (const char* name : {"/cmd vel", "//fix", "/fix/", "/1fix", "/a/2", "/", "/fi\xC3\xA4"})
+    EXPECT_THAT([&] { read_ros_options(section(std::string("names: {command: '") + name + "'}")); },
+                ThrowsMessage<Error>(AllOf(HasSubstr(name), HasSubstr("of letters, digits, _ and /"))));
+  for (const char* name : {"/fix", "/robot1/cmd_vel", "/_a/b2"}) EXPECT_TRUE(is_topic_name(name)) << name;
   EXPECT_THAT([] { read_ros_options(section("command: {steer: true}\nnames: {command: ''}")); },
               ThrowsMessage<Error>(HasSubstr("robot.yaml:2")));
   EXPECT_THAT([] { read_ros_options(section("command: {steer: true, form: ackermann}")); },

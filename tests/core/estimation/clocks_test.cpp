@@ -2,9 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <random>
+#include <utility>
+#include <vector>
 
 namespace rhec {
 namespace clocks_test {
@@ -93,6 +96,20 @@ TEST_F(TwoClocks, JitterAndDisorderAreNoReason) {
   }
   EXPECT_EQ(clocks.settings(), 0);
   EXPECT_EQ(clocks.refused(), 0);
+}
+
+/// A quick sensor whose messages overtake each other by many of its intervals, as over a wireless network.
+TEST_F(TwoClocks, AQuickSourceMayDeliverInAnyOrder) {
+  for (const double held_up : {0.005, 0.03, 0.1}) {
+    std::mt19937 engine(5);
+    std::exponential_distribution<double> delay(1.0 / held_up);
+    std::vector<std::pair<double, double>> messages;  // arrival, stamp
+    for (int k = 0; k < 6000; ++k) messages.emplace_back(10.0 + 0.005 * k + delay(engine), 10.0 + 0.005 * k);
+    std::sort(messages.begin(), messages.end());
+    clocks.reset();
+    for (const auto& [arrival, stamp] : messages) EXPECT_EQ(clocks.take(0, stamp), stamp) << held_up;
+    EXPECT_EQ(clocks.settings(), 0) << held_up;
+  }
 }
 
 TEST_F(TwoClocks, AskedTimesAreThoseOfTheClockThatFits) {

@@ -126,5 +126,26 @@ TEST(MessageReader, ListsTheNumbersOfAMessage) {
               ElementsAre("position[left]", "position[steer]", "position[right]", "velocity[left]", "velocity[steer]"));
 }
 
+TEST(MessageReader, StructuresWithNamesAreListedByThem) {
+  Definitions definitions;
+  parse_ros2msg("my_msgs/msg/Wheel", "uint8 KIND=1\nfloat64 omega 0.0\nstring name", definitions);
+  parse_ros2msg("my_msgs/msg/Drive", "Wheel[<=4] wheels", definitions);
+  const auto type = std::make_shared<const MessageType>(link_message("my_msgs/msg/Drive", definitions));
+  CdrWriter message;
+  const std::vector<std::string> names{"left", "right", "left", "", "7"};
+  message.u32(static_cast<std::uint32_t>(names.size()));
+  for (const std::string& name : names) {
+    message.f64(1.0);
+    message.text(name);
+  }
+  EXPECT_THAT(number_paths(*type, message.bytes()),
+              ElementsAre("wheels[left].omega", "wheels[right].omega", "wheels[2].omega", "wheels[3].omega",
+                          "wheels[4].omega"));
+  MessageReader reader(type, {{"wheels[right].omega"}});
+  double value = 0.0;
+  reader.read({.bytes = message.bytes()}, &value);
+  EXPECT_EQ(value, 1.0);
+}
+
 }  // namespace message_reader_test
 }  // namespace rhec::logs

@@ -41,6 +41,29 @@ TEST_F(CsvLogTest, KnowsSeveralClocksUnitsAndSeparators) {
   EXPECT_EQ(rows(text, {{"x"}, "received"}).stamps, (std::vector<Stamp>{1250000000, 2250000000}));
 }
 
+TEST_F(CsvLogTest, ReadsWhatSpreadsheetsInEuropeWrite) {
+  const std::string text =
+      "\xEF\xBB\xBFsep=;\r\n\"time\";\"speed (km/h)\";steer;\r\n;km/h;\xC2\xB0;\r\n"
+      "01.05.2024 12:00:00,5;3,6;-1,5;\r\n01.05.2024 12:00:01,5;\"7,2\";0;\r\n";
+  const Rows found = rows(text, {{"speed", "steer"}});
+  EXPECT_FALSE(found.damage);
+  ASSERT_EQ(found.values.size(), 2u);
+  EXPECT_EQ(found.values[0], (std::vector<double>{3.6, -1.5}));
+  EXPECT_EQ(found.values[1], (std::vector<double>{7.2, 0.0}));
+  EXPECT_EQ(found.stamps, (std::vector<Stamp>{1714564800500000000, 1714564801500000000}));
+  const auto log = open_csv(path("drive.csv"));
+  EXPECT_EQ(log->unit_of(0, "speed"), "km/h");
+  EXPECT_EQ(log->unit_of(0, "steer"), "deg");
+  EXPECT_EQ(log->unit_of(0, "time"), "");
+}
+
+TEST_F(CsvLogTest, ADecimalPointAmongCommasIsABrokenLine) {
+  EXPECT_THAT(rows("time;x\n0;1,5\n1;2.5\n", {{"x"}}).damage->what,
+              AllOf(HasSubstr("drive.csv:2: found '1,5'"), HasSubstr("with a decimal point")));
+  EXPECT_THAT(rows("time;x\n0;1,5\n" + std::string(2000, '\n') + "1;2.5\n", {{"x"}}).damage->what,
+              AllOf(HasSubstr("drive.csv:2003: found '2.5'"), HasSubstr("with a decimal comma")));
+}
+
 TEST_F(CsvLogTest, UsesWhatIsBeforeABrokenLine) {
   const Rows found = rows("time,x\n0,1\n1,2\n2,three\n3,4\n", {{"x"}});
   EXPECT_EQ(found.values.size(), 2u);

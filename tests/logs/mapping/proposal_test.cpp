@@ -78,6 +78,70 @@ TEST(Proposal, FindsColumnsByTheirNames) {
   EXPECT_EQ(from(proposal, "delta_rate"), ":delta_rate");
 }
 
+const MappedSignal* mapped(const SignalMap& map, const std::string& variable) {
+  for (const MappedSignal& signal : map.signals())
+    if (signal.variable.name == variable) return &signal;
+  return nullptr;
+}
+
+/// A sprayer whose signals have units of their own, by their names, heads or ranges.
+TEST(Proposal, HasTheUnitsThatSignalsSeemToHave) {
+  ModelDescription about = described();
+  about.inputs = {{.name = "omega_left", .unit = "rad/s", .meaning = "wheels of the left side"},
+                  {.name = "omega_right", .unit = "rad/s", .meaning = "wheels of the right side"},
+                  {.name = "v", .unit = "m/s", .meaning = "wheel speed"}};
+  Survey survey;
+  survey.topics = {topic("", "table",
+                         {"GPS front Lat", "GPS front Lon", "GPS rear Lat", "GPS rear Lon", "lateral_acceleration",
+                          "heading", "steer, \"left\"", "rpm left", "ticks right", "wheel_speed_kmh"})};
+  for (FieldSurvey& field : survey.topics[0].fields) {
+    field.least = 0.0;
+    field.most = 350.0;
+  }
+  const std::string proposal = propose_signals(survey, about);
+  const SignalMap map(*parse_yaml(proposal, "proposal.yaml").find("signals"), about);
+  EXPECT_EQ(mapped(map, "x_gps")->from[0].field, "GPS front Lat");
+  EXPECT_EQ(mapped(map, "x_gps")->from[1].field, "GPS front Lon");
+  EXPECT_EQ(mapped(map, "psi_m")->options.sign, -1);
+  EXPECT_EQ(mapped(map, "psi_m")->options.unit, "deg");
+  EXPECT_EQ(mapped(map, "delta")->from[0].field, "steer, \"left\"");
+  EXPECT_EQ(mapped(map, "delta")->options.unit, "deg");
+  EXPECT_EQ(mapped(map, "omega_left")->options.unit, "rpm");
+  EXPECT_EQ(mapped(map, "omega_right")->options.counts, 1024.0);
+  EXPECT_EQ(mapped(map, "v")->options.unit, "km/h");
+  EXPECT_THAT(proposal, testing::HasSubstr("as: direction"));
+  // What the head of a column says need not be said again.
+  survey.topics[0].fields[6].unit = "deg";
+  const std::string known = propose_signals(survey, about);
+  EXPECT_THAT(known, testing::HasSubstr("delta: \"steer, \\\"left\\\"\"    #"));
+}
+
+TEST(Proposal, TheSpeedIsThatOfTheWheelsOfBothSides) {
+  Survey survey;
+  survey.topics = {topic("", "table", {"Radar speed", "rpm left", "rpm right"})};
+  EXPECT_THAT(
+      propose_signals(survey, described()),
+      testing::HasSubstr(
+          "v: {from: [\"rpm left\", \"rpm right\"], as: mean, unit: rpm, radius: 0.3}    # the wheel's radius"));
+  survey.topics = {topic("/joint_states", "sensor_msgs/msg/JointState",
+                         {"position[Left]", "position[Right]", "velocity[Left]", "velocity[Right]"})};
+  const std::string proposal = propose_signals(survey, described());
+  EXPECT_EQ(from(proposal, "v"), "/joint_states:velocity[Left]") << proposal;
+}
+
+TEST(Proposal, TopicsMayHaveAnyName) {
+  Survey survey;
+  survey.topics = {topic("gps/front", "sensor_msgs/msg/NavSatFix", {"latitude"}),
+                   topic("gps rear", "sensor_msgs/msg/NavSatFix", {"latitude"}),
+                   topic("/drive", "my_msgs/msg/Drive", {"left_wheel_speed"})};
+  ModelDescription about = described();
+  about.inputs[0] = {.name = "v_left", .unit = "m/s", .meaning = "speed of the left track"};
+  const std::string proposal = propose_signals(survey, about);
+  EXPECT_THAT(proposal, testing::HasSubstr("x_gps: {from: gps/front, as: east}"));
+  EXPECT_THAT(proposal, testing::HasSubstr("psi_m: {from: [gps/front, \"gps rear\"], as: direction}"));
+  EXPECT_THAT(proposal, testing::HasSubstr("v_left: \"/drive:left_wheel_speed\""));
+}
+
 TEST(Proposal, LeavesToFillInWhatIsNotThere) {
   const std::string proposal = propose_signals({}, described());
   EXPECT_EQ(from(proposal, "delta"), "");

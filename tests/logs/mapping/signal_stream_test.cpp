@@ -1,5 +1,6 @@
 #include "rhec/logs/mapping/signal_stream.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -8,6 +9,7 @@
 #include "logs/support/files.hpp"
 #include "rhec/logs/csv/csv_log.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
+#include "support/error_of.hpp"
 
 namespace rhec::logs {
 namespace signal_stream_test {
@@ -100,6 +102,105 @@ TEST_F(SignalStreamTest, ACounterpartTakesWhatAnotherLeavesOut) {
     return true;
   });
   EXPECT_EQ(is_first, (std::vector<bool>{true, false, true}));
+}
+
+TEST_F(SignalStreamTest, RatesOfCountersThatBeginAnew) {
+  const std::string table = "time,a,x_gps\n0,65530,0\n1,4,0\n2,65534,0\n3,24,0\n";
+  const auto rates_of = [&](const std::string& how) {
+    const auto log = open_csv(write("d.csv", table));
+    SignalStream stream(*log,
+                        map("{outputs: {y_gps: none, psi_m: none, delta: none}, inputs: {v: {from: a, counts: 100, "
+                            "radius: 0.5, derivative: true" +
+                            how + "}, delta_rate: none}}"));
+    std::vector<double> rates;
+    log->read(stream.wanted(), [&](const Record& record) {
+      for (const SignalRow& row : stream.take(record))
+        if (!row.is_output && row.stamp == record.received) rates.push_back(row.values[0] / (M_PI / 100.0));
+      return true;
+    });
+    return rates;
+  };
+  const std::vector<double> found = rates_of(", wraps: 65536");
+  ASSERT_EQ(found.size(), 3u);
+  EXPECT_NEAR(found[0], 10.0, 1e-9);
+  EXPECT_NEAR(found[1], -6.0, 1e-9);
+  EXPECT_NEAR(found[2], 26.0, 1e-9);
+  EXPECT_NEAR(rates_of("")[0], -65526.0, 1e-6);
+}
+
+/// A wheel at 0.2 s a record that turns by more than half a turn in each.
+TEST_F(SignalStreamTest, AnAngleBeyondATurnCountsTurns) {
+  for (const auto& [how, table, expected] :
+       {std::tuple("", "time,a,x_gps\n0,10,0\n1,14,0\n2,18,0\n", 4.0),
+        std::tuple("", "time,a,x_gps\n0,3,0\n1,-3,0\n2,-2.5,0\n", 2.0 * M_PI - 6.0),
+        std::tuple(", wraps: 0", "time,a,x_gps\n0,0,0\n1,4,0\n2,8,0\n", 4.0)}) {
+    const auto log = open_csv(write("d.csv", table));
+    SignalStream stream(*log, map(std::string("{outputs: {y_gps: none, psi_m: none, delta: none}, inputs: {v: none, "
+                                              "delta_rate: {from: a, derivative: true") +
+                                  how + "}}}"));
+    std::vector<double> rates;
+    log->read(stream.wanted(), [&](const Record& record) {
+      for (const SignalRow& row : stream.take(record))
+        if (!row.is_output) rates.push_back(row.values[1]);
+      return true;
+    });
+    EXPECT_NEAR(rates.front(), expected, 1e-9) << table;
+  }
+}
+
+/// Of an output it is the mean since the last record, measured halfway.
+TEST_F(SignalStreamTest, AnOutputMayBeARate) {
+  ModelDescription about = described();
+  about.outputs[3] = {.name = "ground_speed", .unit = "m/s", .meaning = "speed over ground"};
+  const auto log = open_csv(write("d.csv", "time,odometer\n10,5\n11,7\n13,7\n"));
+  SignalStream stream(*log, SignalMap(parse_yaml("{outputs: {x_gps: none, y_gps: none, psi_m: none, ground_speed: "
+                                                 "{from: odometer, unit: m, derivative: true}}, "
+                                                 "inputs: {v: none, delta_rate: none}}",
+                                                 "robot.yaml"),
+                                      about));
+  std::vector<std::pair<Stamp, double>> found;
+  log->read(stream.wanted(), [&](const Record& record) {
+    for (const SignalRow& row : stream.take(record)) found.emplace_back(row.stamp, row.values[3]);
+    return true;
+  });
+  EXPECT_EQ(found, (std::vector<std::pair<Stamp, double>>{{10'500'000'000, 2.0}, {12'000'000'000, 0.0}}));
+}
+
+TEST_F(SignalStreamTest, TheHeadOfAColumnSaysItsUnit) {
+  const auto value_of = [&](const std::string& table, const std::string& delta) {
+    const auto log = open_csv(write("d.csv", table));
+    SignalStream stream(*log, map("{outputs: {x_gps: none, y_gps: none, psi_m: none, delta: " + delta +
+                                  "}, inputs: {v: none, delta_rate: none}}"));
+    double value = 0.0;
+    log->read(stream.wanted(), [&](const Record& record) {
+      for (const SignalRow& row : stream.take(record)) value = row.values[3];
+      return true;
+    });
+    return value;
+  };
+  EXPECT_NEAR(value_of("time,steer [deg]\n0,90\n", "steer"), M_PI / 2, 1e-12);
+  EXPECT_NEAR(value_of("time,delta (\xC2\xB0)\n0,90\n", "{sign: -1}"), -M_PI / 2, 1e-12);
+  EXPECT_NEAR(value_of("time,steer\ns,deg\n0,90\n", "steer"), M_PI / 2, 1e-12);
+  EXPECT_EQ(value_of("time,steer [deg]\n0,2\n", "{from: steer, unit: rad}"), 2.0) << "who says it, knows";
+  EXPECT_EQ(value_of("time,steer [volt]\n0,2\n", "{from: steer, scale: 0.5}"), 1.0);
+  EXPECT_THAT(error_of([&] { value_of("time,steer [m]\n0,2\n", "steer"); }),
+              testing::AllOf(testing::HasSubstr("gives [m], but delta is in [rad]"),
+                             testing::HasSubstr("the head of the column 'steer'")));
+}
+
+/// As PlotJuggler names them.
+TEST_F(SignalStreamTest, ColumnsMayHaveNamesOfTopics) {
+  const auto log = open_csv(write("d.csv", "__time,/fix/altitude,/a:b\n1,2,3\n"));
+  SignalStream stream(*log, map("{outputs: {x_gps: /fix/altitude, y_gps: {from: '/a:b', when: {of: /fix/altitude, "
+                                "at_most: 2}}, psi_m: none, delta: none}, inputs: {v: none, delta_rate: none}}"));
+  log->read(stream.wanted(), [&](const Record& record) {
+    for (const SignalRow& row : stream.take(record)) {
+      EXPECT_EQ(row.values[0], 2.0);
+      EXPECT_EQ(row.values[1], 3.0);
+    }
+    return true;
+  });
+  EXPECT_EQ(stream.counts()[1].values, 1);
 }
 
 TEST_F(SignalStreamTest, BegunAnewItForgetsWhatDerivativesHaveInHand) {

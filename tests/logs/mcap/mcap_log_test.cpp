@@ -3,12 +3,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstdint>
 #include <cstring>
 
 #include "logs/support/files.hpp"
 #include "logs/support/rows.hpp"
 #include "logs/support/small_mcap.hpp"
+#include "rhec/logs/storage/compression.hpp"
 #include "support/error_of.hpp"
 
 namespace rhec::logs {
@@ -24,6 +26,48 @@ class McapLogTest : public FilesTest {
     return content_of(path("x.mcap"));
   }
 };
+
+/// As rosbag2 writes with `compression_mode: message`.
+TEST_F(McapLogTest, MessagesMayBeCompressedOneByOne) {
+  McapWriter writer(path("x.mcap"));
+  const std::uint16_t a = writer.add_channel("/a", "std_msgs/msg/Float64", "float64 data");
+  for (int i = 0; i < 3; ++i) {
+    CdrWriter message;
+    message.f64(i);
+    std::vector<std::byte> block;
+    compress_zstd(message.bytes(), block);
+    if (i == 1) block.resize(block.size() - 1);
+    writer.write(a, Stamp{1'000'000} * (i + 1), block);
+  }
+  writer.close();
+  const Rows found = rows_of(*open_mcap(path("x.mcap")), "/a", {{"data"}});
+  ASSERT_EQ(found.values.size(), 2u);
+  EXPECT_EQ(found.values[1][0], 2.0);
+  ASSERT_TRUE(found.damage);
+  EXPECT_THAT(found.damage->what, HasSubstr("a message is damaged"));
+}
+
+TEST_F(McapLogTest, ATypeMayBeDefinedAnewOnTheWay) {
+  McapWriter writer(path("x.mcap"));
+  for (const char* definition : {"float64 x", "float64 added\nfloat64 x"}) {
+    const bool is_second = definition[8] == 'a';
+    const std::uint16_t channel = writer.add_channel("/a", "my_msgs/msg/A", definition);
+    CdrWriter message;
+    if (is_second) message.f64(7.0);
+    message.f64(is_second ? 2.0 : 1.0);
+    writer.write(channel, 1'000'000, message.bytes());
+  }
+  writer.close();
+  const auto log = open_mcap(path("x.mcap"));
+  ASSERT_EQ(log->topics().size(), 1u);
+  EXPECT_EQ(log->topics()[0].count, 2);
+  const Rows found = rows_of(*log, "/a", {{"x", "added"}});
+  ASSERT_EQ(found.values.size(), 2u);
+  EXPECT_EQ(found.values[0][0], 1.0);
+  EXPECT_TRUE(std::isnan(found.values[0][1]));
+  EXPECT_EQ(found.values[1], (std::vector<double>{2.0, 7.0}));
+  EXPECT_THAT(error_of([&] { log->reader(0, {{"y"}}); }), HasSubstr("has no field 'y'"));
+}
 
 TEST_F(McapLogTest, ACutFileGivesWhatIsBeforeTheCut) {
   const std::string whole = small(5000, 1000);

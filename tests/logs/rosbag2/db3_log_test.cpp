@@ -76,6 +76,35 @@ TEST_F(Db3LogTest, ACutBagGivesWhatIsBeforeTheCut) {
   EXPECT_GT(rows.values.size(), 100u);
 }
 
+/// SQLite's tree leads to most of a bag of some megabytes by a page at its end.
+TEST_F(Db3LogTest, OfACutBagPagesAreReadThatNothingLeadsToAnyMore) {
+  const std::string whole = content_of(bag(60000));
+  for (const double share : {0.3, 0.41234, 0.51317, 0.6, 0.77777, 0.9}) {
+    const auto size = static_cast<std::size_t>(share * static_cast<double>(whole.size()));
+    const Rows rows = rows_of(*open_db3(write("y.db3", whole.substr(0, size))), "/a", {{"data"}});
+    ASSERT_TRUE(rows.damage);
+    EXPECT_GT(static_cast<double>(rows.values.size()), (share - 0.01) * 60000.0);
+    for (std::size_t i = 0; i < rows.values.size(); ++i) ASSERT_EQ(rows.values[i][0], static_cast<double>(i));
+  }
+}
+
+/// A recorder that is killed leaves a journal, by which SQLite would undo what was written last.
+TEST_F(Db3LogTest, ABagWhoseRecorderWasKilledIsRead) {
+  const auto file = bag(5000);
+  sqlite3* database = nullptr;
+  sqlite3_open(file.c_str(), &database);
+  sqlite3_exec(database, "PRAGMA cache_size=10; BEGIN; UPDATE messages SET timestamp = timestamp + 1", nullptr, nullptr,
+               nullptr);
+  const std::filesystem::path killed = path("killed # 1?.db3");
+  std::filesystem::copy_file(file, killed);
+  std::filesystem::copy_file(file.string() + "-journal", killed.string() + "-journal");
+  sqlite3_close(database);
+  const Rows rows = rows_of(*open_db3(killed), "/a", {{"data"}});
+  EXPECT_EQ(rows.values.size(), 5000u);
+  ASSERT_TRUE(rows.damage);
+  EXPECT_THAT(rows.damage->what, HasSubstr("was ended while it wrote, as killed # 1?.db3-journal shows"));
+}
+
 TEST_F(Db3LogTest, RefusesDatabasesThatAreNoBags) {
   sqlite3* database = nullptr;
   sqlite3_open(path("z.db3").c_str(), &database);

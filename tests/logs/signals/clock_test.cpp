@@ -32,6 +32,11 @@ TEST(Clock, KnowsUnits) {
   EXPECT_EQ(parse_clock_name("wheel[left]").name, "wheel[left]");
 }
 
+TEST(Clock, ReadsDatesWhateverTheUnit) {
+  EXPECT_EQ(stamp_of("1970-01-02T00:00:01.5Z", 0.0), 86401500000000);
+  EXPECT_EQ(stamp_of("1970-01-02 00:00:01", *clock_unit("ms")), 86401000000000);
+}
+
 TEST(Clock, RefusesWhatIsNoTime) {
   for (const char* text : {"", "now", "1.2.3", "1e300", "nan", "inf", "--1"}) EXPECT_FALSE(stamp_of(text, 0.0)) << text;
   EXPECT_FALSE(stamp_of("99999999999999999999", *clock_unit("s")));

@@ -42,6 +42,43 @@ TEST_F(SurveyTest, TellsDamageAndWhatWasBeforeIt) {
   EXPECT_THAT(found.damage->what, testing::HasSubstr("drive.csv:4: found 1 cells, expected 2"));
 }
 
+/// A topic whose second record is broken, beside one that is whole.
+class TwoTopics final : public Log {
+ public:
+  TwoTopics() : Log("bag") { topics_ = {{"/a", "A", 3}, {"/b", "B", 3}}; }
+  std::unique_ptr<FieldReader> reader(int, const FieldRequest&) const override { return std::make_unique<Reader>(); }
+  std::vector<std::string> fields_of(const Record&) const override { return {"x"}; }
+  std::optional<Damage> read(const std::vector<bool>&, const Take& take) const override {
+    for (int i = 0; i < 6; ++i)
+      if (!take({.topic = i % 2, .received = i, .place = i, .bytes = {}})) break;
+    return std::nullopt;
+  }
+  Damage damage_at(const Record& record, const RecordError& error) const override {
+    return {"bag: byte " + std::to_string(record.place) + ": " + error.what()};
+  }
+
+ private:
+  struct Reader final : FieldReader {
+    Stamp read(const Record& record, double* values) override {
+      if (record.place == 2) throw RecordError("it is short");
+      values[0] = static_cast<double>(record.place);
+      return record.received;
+    }
+  };
+};
+
+TEST_F(SurveyTest, ABrokenMessageIsItsTopicsAffair) {
+  const Survey found = survey(TwoTopics());
+  EXPECT_FALSE(found.damage);
+  EXPECT_EQ(found.topics[0].count, 3);
+  EXPECT_EQ(found.topics[0].broken, 1);
+  EXPECT_EQ(found.topics[0].first_broken, "bag: byte 2: it is short");
+  EXPECT_EQ(found.topics[0].fields[0].count, 2);
+  EXPECT_EQ(found.topics[0].fields[0].most, 4.0);
+  EXPECT_EQ(found.topics[1].broken, 0);
+  EXPECT_EQ(found.topics[1].fields[0].count, 3);
+}
+
 TEST_F(SurveyTest, SaysWhyItKnowsNothingOfATopic) {
   const auto log = open_csv(write("drive.csv", "when,speed\n0,1\n"));
   EXPECT_THAT(survey(*log).topics.front().unreadable, testing::HasSubstr("no column 'time'"));

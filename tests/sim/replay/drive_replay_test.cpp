@@ -99,6 +99,31 @@ TEST_F(DriveReplayTest, ADriveBeginsWhereItsFirstMeasurementsSay) {
   EXPECT_NEAR(start[2], M_PI / 2.0, 1e-12);
 }
 
+/// As where a robot's clock is set by an hour: estimates of a minute, and then from the next measurement on.
+TEST_F(DriveReplayTest, NothingIsEstimatedInALongSilence) {
+  const ReplayScenario scenario(Host(), settings_of("skid_steer"));
+  logs::Drive gap;
+  gap.outputs = 3;
+  gap.inputs = 2;
+  const std::vector<double> times{0.0, 1.0, 2.0, 3000.0, 3001.0, 3040.0};
+  for (const double time : times) {
+    gap.events.push_back({time, time, true, gap.values.size()});
+    gap.values.insert(gap.values.end(), {0.0, 0.0, 0.0});
+  }
+  const Robot& robot = scenario.variants().front().robot;
+  const DriveReplay replay = replay_drive(robot, gap);
+  double longest = 0.0, before = 0.0;
+  std::size_t within_last = 0;
+  for (const DriveEstimate& estimate : replay.estimates) {
+    longest = std::max(longest, estimate.time - before);
+    if (estimate.time > 3001.5) ++within_last;
+    before = estimate.time;
+  }
+  EXPECT_NEAR(longest, 3000.0 - 62.0, 2.0 * robot.step());
+  EXPECT_NEAR(static_cast<double>(within_last), 38.5 / robot.step(), 2.0) << "a shorter silence is estimated through";
+  EXPECT_NEAR(before, 3040.0, robot.step());
+}
+
 TEST_F(DriveReplayTest, RefusesADriveThatLeaps) {
   const ReplayScenario scenario(Host(), settings_of("skid_steer"));
   logs::Drive leap;

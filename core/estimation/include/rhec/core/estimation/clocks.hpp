@@ -15,7 +15,8 @@ namespace rhec {
 /// the second one confirms a gap (no longer than `longest_gap`), the third one that the source's clock was set. The
 /// source's stamps then go on from where they were, and its clock's offset is kept; other sources whose clock was
 /// set alike take it over at once. A source whose clock is set back by less than `behind` is recognised by going
-/// through times again for which it has delivered already; data that were only held up fill a gap.
+/// through times again for which it has delivered already; data that were only held up, or that come in another
+/// order, fill a gap that is wider than usual.
 ///
 /// Timeline and stamps in seconds. Allocates in its constructor only.
 class RHEC_EXPORT Clocks {
@@ -49,7 +50,7 @@ class RHEC_EXPORT Clocks {
   void reset() noexcept;
 
  private:
-  static constexpr std::size_t remembered = 32;
+  static constexpr std::size_t remembered = 128;
   struct Source {
     double offset = 0.0, newest = 0.0, usual = 0.0;
     double first_suspect = 0.0, last_suspect = 0.0;  ///< stamps
@@ -59,6 +60,8 @@ class RHEC_EXPORT Clocks {
   };
   enum class Place { in_order, late, repeated, far_ahead, far_behind };
   Place place(const Source& source, double time) const noexcept;
+  /// Whether a time lies between stamps of a source that are no further apart than others.
+  static bool is_within(const Source& source, double time) noexcept;
   double room_ahead(const Source& source) const noexcept;
   double use(Source& source, double time) noexcept;
   void suspect(Source& source, double stamp) noexcept;

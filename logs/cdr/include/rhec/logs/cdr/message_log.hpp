@@ -14,6 +14,7 @@ namespace rhec::logs {
 /// How logs of messages are opened.
 struct MessageLogOptions {
   std::vector<std::filesystem::path> msg_paths;  ///< folders of packages with .msg or .idl files
+  std::string name = {};                         ///< what the user calls the file; empty: its path
 };
 
 /// How the messages of a topic are written.
@@ -21,6 +22,7 @@ struct MessageEncoding {
   std::string serialization;    ///< "cdr"
   std::string schema_encoding;  ///< "ros2msg", "ros2idl"; empty: the file does not define the type
   std::string schema;
+  bool operator==(const MessageEncoding&) const = default;
 };
 
 /// A log of messages in CDR, whatever file they lie in.
@@ -31,15 +33,22 @@ class RHEC_EXPORT MessageLog : public Log {
 
  protected:
   MessageLog(std::string name, MessageLogOptions options);
-  /// Adds a topic, or finds the one that has this name and type. Returns its index.
-  int add_topic(const std::string& name, const std::string& type, MessageEncoding encoding);
+  /// Adds a topic, or finds the one that has this name and type. Returns its index, and that of the encoding among the
+  /// topic's: a type may be defined anew while it is recorded.
+  struct Place {
+    int topic = 0, form = 0;
+  };
+  Place add_topic(const std::string& name, const std::string& type, MessageEncoding encoding);
   /// What the messages of a topic are made of. Throws Error for a type that nobody defines.
-  std::shared_ptr<const MessageType> type_of(int topic) const;
+  std::shared_ptr<const MessageType> type_of(int topic, int form = 0) const;
 
  private:
   MessageLogOptions options_;
-  std::vector<MessageEncoding> encodings_;
-  mutable std::vector<std::shared_ptr<const MessageType>> types_;  ///< by topic, once they are asked for
+  struct Form {
+    MessageEncoding encoding;
+    mutable std::shared_ptr<const MessageType> type = {};  ///< once it is asked for
+  };
+  std::vector<std::vector<Form>> forms_;  ///< by topic
 };
 
 }  // namespace rhec::logs

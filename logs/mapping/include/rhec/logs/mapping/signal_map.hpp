@@ -18,10 +18,12 @@ enum class SignalForm : std::uint8_t {
   value,  ///< one number
   east,
   north,
-  up,       ///< latitude, longitude and height in the local plane [m]
-  heading,  ///< of a quaternion x, y, z, w: the angle about the vertical [rad]
-  mean,     ///< of all
-  turn,     ///< (second - first) / track: the yaw rate of the speeds of a left and a right side
+  up,         ///< latitude, longitude and height in the local plane [m]
+  heading,    ///< of a quaternion x, y, z, w: the angle about the vertical [rad]
+  mean,       ///< of all
+  turn,       ///< (second - first) / track: the yaw rate of the speeds of a left and a right side
+  direction,  ///< of a vector to the east and north, or from one fix to another: an angle [rad]
+  yaw_rate,   ///< of an angular velocity x, y, z: about the vehicle's vertical
 };
 
 /// How one output or input is read from a log: sign * scale * unit * signal + offset.
@@ -32,7 +34,8 @@ struct SignalOptions {
   int sign = 1;
   std::optional<double> scale;
   double offset = 0.0;
-  std::optional<double> radius, track;
+  std::optional<double> radius, track, counts, wraps;
+  std::vector<double> rpy;
   double delay = 0.0;
   bool derivative = false;
   std::string clock;
@@ -73,8 +76,9 @@ struct MappedSignal {
   std::vector<SignalCondition> conditions = {};  ///< on fields of the same records
   std::optional<StatedAccuracy> accuracy = {};   ///< a field of the same records; none: as the scenario says
   double factor = 1.0;                           ///< sign, scale, unit and radius
-  bool is_angle = false;                         ///< what is read is one: its differences are taken on the circle
-  double sigma_factor = 1.0;                     ///< of a stated standard deviation
+  bool is_angle = false;      ///< what is read is one: its differences are taken on the circle, unless it counts turns
+  double sigma_factor = 1.0;  ///< of a stated standard deviation
+  double period = 0.0;        ///< by which what is read begins anew; 0: never
 };
 
 /// Which signals of a log are a model's outputs and inputs. A variable that the section does not name is the signal of
@@ -99,6 +103,7 @@ class RHEC_EXPORT SignalMap {
   std::optional<GeodeticPoint> origin_;
   std::vector<MappedSignal> signals_;  ///< without `from`: by name
   std::vector<bool> is_none_;
+  std::vector<Settings> entries_;  ///< by signal: where it is told, or the section
   Settings section_;
   int outputs_ = 0, inputs_ = 0;
 };

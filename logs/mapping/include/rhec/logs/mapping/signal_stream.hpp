@@ -74,6 +74,8 @@ class RHEC_EXPORT SignalStream {
   Reading& reading_of(int topic, const std::string& clock);
   void read(const Record& record, Reading& reading);
   void complete(Channel& channel, Stamp stamp);
+  static bool belongs(Channel& channel, Stamp stamp);
+  static double change_since_last(Channel& channel, double value);
   void put(Channel& channel, Stamp stamp, double value);
   void note_accuracy(const Log& log, const MappedSignal& signal, const std::string& type);
 

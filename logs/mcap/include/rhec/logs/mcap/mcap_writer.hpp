@@ -6,6 +6,7 @@
 #include <map>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "rhec/core/base/export.hpp"
@@ -42,8 +43,8 @@ class RHEC_EXPORT McapWriter {
   std::uint64_t place_ = 0;
   std::uint32_t summary_crc_ = 0;
   std::vector<ByteWriter> schemas_, channels_;
-  std::map<std::string, std::uint16_t> schema_ids_;
-  std::vector<std::uint32_t> sequences_;  ///< messages, by channel
+  std::map<std::pair<std::string, std::string>, std::uint16_t> schema_ids_;  ///< by type and definition
+  std::vector<std::uint32_t> sequences_;                                     ///< messages, by channel
   ByteWriter chunk_;
   std::vector<std::byte> compressed_;
   std::uint64_t chunk_first_ = 0, chunk_last_ = 0;

@@ -37,6 +37,7 @@ struct Record {
   int topic = 0;
   Stamp received = 0;      ///< when it was recorded; `no_stamp` where nobody says so
   std::int64_t place = 0;  ///< byte offset, number of the record, or line: for messages to the user
+  int form = 0;            ///< of the topic's definitions, the one that it is written by
   std::span<const std::byte> bytes;
 };
 
@@ -84,6 +85,9 @@ class RHEC_EXPORT Log {
   virtual std::unique_ptr<FieldReader> reader(int topic, const FieldRequest& request) const = 0;
   /// Names of the numbers in a record, as `reader` takes them; of very many, the first. Throws RecordError.
   virtual std::vector<std::string> fields_of(const Record& record) const = 0;
+
+  /// The unit that a field is in, by its name in units.hpp, where the log says so: the head of a column; else empty.
+  virtual std::string unit_of(int topic, std::string_view field) const;
 
   /// Hands out the records of topics that are `wanted` (by index), until `take` returns false.
   using Take = std::function<bool(const Record& record)>;

@@ -15,6 +15,7 @@ struct FieldSurvey {
   std::int64_t count = 0;          ///< values that are not missing
   double least = 0.0, most = 0.0;  ///< of them
   double first = 0.0;
+  std::string unit = {};  ///< where the log says it: see Log::unit_of
 };
 
 /// What there is of one topic.
@@ -28,7 +29,9 @@ struct TopicSurvey {
   double largest_lateness = 0.0;            ///< between measured and received [s]
   std::int64_t backwards = 0;               ///< records with a stamp before that of the one before them
   std::vector<FieldSurvey> fields;
-  std::string unreadable;  ///< why nothing is known of its fields; empty: something is
+  std::int64_t broken = 0;   ///< messages that cannot be read
+  std::string first_broken;  ///< where the first of them is, and what is wrong with it
+  std::string unreadable;    ///< why nothing is known of its fields; empty: something is
 };
 
 struct Survey {

@@ -31,9 +31,12 @@ class RHEC_EXPORT ZstdStream {
   ZstdStream& operator=(const ZstdStream&) = delete;
   /// What the next block decompresses to. Returns why that failed, or an empty text.
   std::string decompress(std::span<const std::byte> block, std::vector<std::byte>& bytes);
+  /// Whether what has come ends within a frame.
+  bool is_within_frame() const noexcept { return is_within_frame_; }
 
  private:
   void* context_;  ///< zstd's
+  bool is_within_frame_ = false;
 };
 /// Compresses a block by zstd.
 RHEC_EXPORT void compress_zstd(std::span<const std::byte> bytes, std::vector<std::byte>& block);

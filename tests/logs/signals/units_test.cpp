@@ -1,4 +1,4 @@
-#include "rhec/logs/mapping/units.hpp"
+#include "rhec/logs/signals/units.hpp"
 
 #include <gtest/gtest.h>
 
@@ -14,6 +14,16 @@ TEST(Units, AreFactorsOfThoseOfTheInternationalSystem) {
   EXPECT_EQ(find_unit("kn")->si, "m/s");
   EXPECT_FALSE(find_unit("furlong"));
   for (const std::string& name : unit_names()) EXPECT_TRUE(find_unit(find_unit(name)->si)) << name;
+}
+
+TEST(Units, AreRecognisedAsPeopleWriteThem) {
+  EXPECT_EQ(unit_of_header("\xC2\xB0"), "deg");
+  EXPECT_EQ(unit_of_header("\xB0/s"), "deg/s");
+  EXPECT_EQ(unit_of_header("U/min"), "rpm");
+  EXPECT_EQ(unit_of_header("KM/H"), "km/h");
+  EXPECT_EQ(unit_of_header("m / s"), "m/s");
+  EXPECT_EQ(unit_of_header("left_wheel"), "");
+  EXPECT_EQ(unit_of_header(""), "");
 }
 
 }  // namespace units_test

@@ -16,6 +16,8 @@ struct Unit {
 };
 /// Empty for an unknown name.
 RHEC_EXPORT std::optional<Unit> find_unit(std::string_view name);
+/// A unit as people write it in the head of a column ("°", "kmh", "1/min"), by its name here; empty: none is known.
+RHEC_EXPORT std::string unit_of_header(std::string_view text);
 RHEC_EXPORT std::vector<std::string> unit_names();
 
 }  // namespace rhec::logs
