@@ -133,7 +133,7 @@ class CsvLog final : public Log {
     for (const std::string& field : request.fields) columns.push_back(layout_.column(field));
     const bool is_received = request.clock == received_clock && layout_.received < 0;
     const int clock = request.clock.empty() || is_received ? layout_.clock : layout_.column(request.clock);
-    if (clock < 0)
+    if (clock < 0 && !is_received)
       throw Error(
           fmt::format("{} has no column 'time'; name the column that says when a line was measured: its columns "
                       "are {}; e.g. `signals.clock: {}`",

@@ -355,6 +355,17 @@ void append_section(const char* name, const std::vector<Variable>& variables, bo
   }
 }
 
+/// Of a table of which nobody knows when its lines were measured.
+void append_clock(const TopicSurvey& topic, std::string& text) {
+  if (!topic.topic.name.empty() || topic.unreadable.empty()) return;
+  const auto clock = std::ranges::find_if(
+      topic.fields, [&](const FieldSurvey& field) { return field.is_rising && field.count == topic.count; });
+  if (clock != topic.fields.end())
+    text += fmt::format(
+        "  clock: {}    # the first column that rises: does it count seconds? Else `{} [ms]`, or the like\n",
+        plain(clock->name), clock->name);
+}
+
 /// What to do where a receiver's fixes are now better, now worse.
 void append_grades(const TopicSurvey& fixes, std::string& text) {
   constexpr double by_much = 4.0;
@@ -378,6 +389,7 @@ void append_grades(const TopicSurvey& fixes, std::string& text) {
 std::string propose_signals(const Survey& survey, const ModelDescription& about) {
   Proposer proposer(survey);
   std::string text = "signals:\n";
+  for (const TopicSurvey& topic : survey.topics) append_clock(topic, text);
   append_section("outputs", about.outputs, true, proposer, text);
   for (const TopicSurvey& topic : survey.topics)
     if (topic.topic.type == fix_type) append_grades(topic, text);

@@ -85,7 +85,12 @@ class Taker {
       reader_ = log_.reader(record.topic, request);
     } catch (const Error& error) {  // of a topic that is not understood, the number of records is known at least
       result_.unreadable = error.what();
-      return;
+      request.clock = received_clock;
+      try {  // without the times
+        reader_ = log_.reader(record.topic, request);
+      } catch (const Error&) {
+        return;
+      }
     }
     values_.resize(request.fields.size());
     for (const std::string& field : request.fields)
@@ -95,6 +100,8 @@ class Taker {
   static void take(double value, FieldSurvey& field) noexcept {
     if (std::isnan(value)) return;
     if (field.count++ == 0) field.first = field.least = field.most = value;
+    if (field.count > 1 && !(value > field.last)) field.is_rising = false;
+    field.last = value;
     field.least = std::min(field.least, value);
     field.most = std::max(field.most, value);
   }

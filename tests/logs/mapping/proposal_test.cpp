@@ -129,6 +129,16 @@ TEST(Proposal, TheSpeedIsThatOfTheWheelsOfBothSides) {
   EXPECT_EQ(from(proposal, "v"), "/joint_states:velocity[Left]") << proposal;
 }
 
+TEST(Proposal, AClockIsAColumnThatRises) {
+  Survey survey;
+  survey.topics = {topic("", "table", {"speed", "Zeit"})};
+  survey.topics[0].fields[0].is_rising = false;
+  EXPECT_THAT(propose_signals(survey, described()), testing::Not(testing::HasSubstr("clock:")));
+  survey.topics[0].unreadable = "no column 'time'";
+  EXPECT_THAT(propose_signals(survey, described()), testing::HasSubstr("signals:\n  clock: Zeit    #"));
+  EXPECT_EQ(from(propose_signals(survey, described()), "v"), ":speed");
+}
+
 TEST(Proposal, TopicsMayHaveAnyName) {
   Survey survey;
   survey.topics = {topic("gps/front", "sensor_msgs/msg/NavSatFix", {"latitude"}),

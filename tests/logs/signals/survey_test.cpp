@@ -81,7 +81,11 @@ TEST_F(SurveyTest, ABrokenMessageIsItsTopicsAffair) {
 
 TEST_F(SurveyTest, SaysWhyItKnowsNothingOfATopic) {
   const auto log = open_csv(write("drive.csv", "when,speed\n0,1\n"));
-  EXPECT_THAT(survey(*log).topics.front().unreadable, testing::HasSubstr("no column 'time'"));
+  const TopicSurvey found = survey(*log).topics.front();
+  EXPECT_THAT(found.unreadable, testing::HasSubstr("no column 'time'"));
+  ASSERT_EQ(found.fields.size(), 2u) << "which numbers there are is known, all the same";
+  EXPECT_EQ(found.fields[1].name, "speed");
+  EXPECT_EQ(found.fields[1].most, 1.0);
 }
 
 }  // namespace survey_test

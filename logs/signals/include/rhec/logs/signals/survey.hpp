@@ -14,7 +14,8 @@ struct FieldSurvey {
   std::string name;
   std::int64_t count = 0;          ///< values that are not missing
   double least = 0.0, most = 0.0;  ///< of them
-  double first = 0.0;
+  double first = 0.0, last = 0.0;
+  bool is_rising = true;  ///< each is larger than the one before
   std::string unit = {};  ///< where the log says it: see Log::unit_of
 };
 
@@ -31,7 +32,7 @@ struct TopicSurvey {
   std::vector<FieldSurvey> fields;
   std::int64_t broken = 0;   ///< messages that cannot be read
   std::string first_broken;  ///< where the first of them is, and what is wrong with it
-  std::string unreadable;    ///< why nothing is known of its fields; empty: something is
+  std::string unreadable;    ///< why nothing is known of its fields, or of when they were measured; empty: all is
 };
 
 struct Survey {
