@@ -55,6 +55,8 @@ std::shared_ptr<const RobotContext> context_of(const Host& host, const RobotOpti
 }
 
 constexpr double longest_usual_step = 1.0;  // [s]
+/// More explicit steps of an interval are noted: a solve then takes tens of times as long as with one.
+constexpr int most_usual_substeps = 16;
 
 /// Says that explicit steps cost much in these sections ("estimator, controller"); empty if they do not.
 std::string costly_steps_note(const RobotContext& context, const std::string& sections) {
@@ -64,7 +66,7 @@ std::string costly_steps_note(const RobotContext& context, const std::string& se
   for (const Variable& parameter : context.about.parameters) parameters.push_back(middle_value(parameter));
   const StepRequirement needed =
       step_requirement(model, operating_points(model, context.about, parameters), context.step);
-  if (needed.mode_substeps <= most_explicit_substeps || needed.state < 0) return {};
+  if (needed.mode_substeps <= most_usual_substeps || needed.state < 0) return {};
   return fmt::format(
       "{}: an interval of {:g} s takes {} Runge-Kutta steps, since the model '{}' has a time constant of {:.3g} s, in "
       "the state '{}'; a solve takes many times as long as with integrator: implicit, which follows it in a few steps",
