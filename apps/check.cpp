@@ -66,7 +66,8 @@ RobotOptions robot_of_scenario(const CheckArguments& arguments, std::optional<do
   Settings robot = Settings::map(settings.origin());
   for (const auto& [key, value] : settings.members())
     if (key != "log" && key != "variants") robot.add(key, value);  // keys of recorded drives
-  auto options = sim::ScenarioOptions::table().parse(settings.is_null() ? settings : robot, "scenario");
+  auto options =
+      sim::ScenarioOptions::table().parse(settings.kind() == Settings::Kind::map ? robot : settings, "scenario");
   if (given && !speed) speed = options.speed;
   return options;
 }

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <string>
 #include <utility>
 #include <vector>
@@ -15,15 +16,47 @@
 namespace rhec {
 namespace {
 
+bool is_among(const std::vector<Variable>& variables, const std::string& name) {
+  return std::ranges::any_of(variables, [&](const Variable& variable) { return variable.name == name; });
+}
+
+/// What is said of a sensor that the vehicle could have, where `model.outputs` is not given and the usual ones are
+/// taken.
+void refuse_unusual_outputs(const Host& host, const RobotOptions& options, const ModelDescription& about) {
+  if (options.model.find("outputs")) return;
+  for (const char* const key : {"outputs", "biases", "scales"}) {
+    const Settings* const map = options.noise.find(key);
+    if (!map || map->kind() != Settings::Kind::map) continue;
+    for (const auto& [name, value] : map->members()) {
+      if (is_among(about.outputs, name)) continue;
+      Settings all = options.model;
+      if (all.kind() == Settings::Kind::scalar) {
+        all = Settings::map(options.model.origin());
+        all.set("name", options.model);
+      } else if (all.is_null()) {
+        all = Settings::map();
+      }
+      all.set("outputs", Settings::scalar("all"));
+      if (is_among(ModelSection(host, all).model()->description().outputs, name))
+        throw value.error(
+            "the vehicle could have this sensor, but only its usual ones are measured where model.outputs "
+            "is not given; name it there");
+    }
+  }
+}
+
 std::shared_ptr<const RobotContext> context_of(const Host& host, const RobotOptions& options,
                                                const ModelSection& section) {
   const std::shared_ptr<const Model>& model = section.model();
+  refuse_unusual_outputs(host, options, model->description());
   const NoiseSection noise(options.noise, model->description(), section.left_out());
   const BoundsSection bounds(options.bounds, model->description());
   return std::make_shared<const RobotContext>(RobotContext{host, options.step, model, bounds.bounded(), noise});
 }
 
 constexpr double longest_usual_step = 1.0;  // [s]
+/// More explicit steps of an interval are noted: a solve then takes tens of times as long as with one.
+constexpr int most_usual_substeps = 16;
 
 /// Says that explicit steps cost much in these sections ("estimator, controller"); empty if they do not.
 std::string costly_steps_note(const RobotContext& context, const std::string& sections) {
@@ -33,7 +66,7 @@ std::string costly_steps_note(const RobotContext& context, const std::string& se
   for (const Variable& parameter : context.about.parameters) parameters.push_back(middle_value(parameter));
   const StepRequirement needed =
       step_requirement(model, operating_points(model, context.about, parameters), context.step);
-  if (needed.mode_substeps <= most_explicit_substeps || needed.state < 0) return {};
+  if (needed.mode_substeps <= most_usual_substeps || needed.state < 0) return {};
   return fmt::format(
       "{}: an interval of {:g} s takes {} Runge-Kutta steps, since the model '{}' has a time constant of {:.3g} s, in "
       "the state '{}'; a solve takes many times as long as with integrator: implicit, which follows it in a few steps",

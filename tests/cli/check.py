@@ -195,6 +195,12 @@ class Test(cli.Findings):
             name = " ".join(map(str, words))
             self.expect(result.returncode == code, name, f"exit code {result.returncode}: {result.stderr}")
             self.expect(not result.stdout and text in result.stderr, name, f"{result.stdout}{result.stderr}")
+        with tempfile.TemporaryDirectory() as folder:
+            table = pathlib.Path(folder) / "line.csv"
+            table.write_text("x,y\n0,0\n9,0\n")
+            result = self.rhec("check", table)
+            self.expect(result.returncode == ERROR and not result.stdout and "expected a map" in result.stderr, "a table",
+                        f"{result.stdout}{result.stderr}")
 
     def others(self):
         one, other = (self.check("seed", "bicycle_slip", "--seed", seed) for seed in (1, 2))

@@ -219,6 +219,18 @@ class Test(cli.Findings):
         self.expect(result.returncode == FINE and "the integration was too coarse" in result.stdout, "substeps 8",
                     result.stdout + result.stderr)
 
+    def limits(self):
+        """A soft limit that costs too little to be kept."""
+        self.count_of_runs += 1
+        terms = "controller.terms=[{name: keep_out, lines: [{x: 0, y: -18, direction: 0}], soft: {linear: 0.01, quadratic: 0}}]"
+        result = self.rhec("run", FIGURE8, "--out", self.work / "limits",
+                           *assignments("path={name: zigzag, legs: 1, leg_length: 30}", "speed=3", terms), cwd=self.work)
+        self.expect(result.returncode == FINE and "LIMIT VIOLATED" in result.stdout and "keep_out: line 1" in result.stdout,
+                    "limits", result.stdout + result.stderr)
+        limits = json.loads((self.work / "limits" / "summary.json").read_text())["limits"]
+        self.expect(list(limits) == ["keep_out: line 1"] and limits["keep_out: line 1"]["violated"] > 20, "limits", f"{limits}")
+        self.expect(abs(limits["keep_out: line 1"]["most"] - 2.5) < 0.5, "limits", f"{limits}")
+
     def others(self):
         result = self.rhec("plugins", "--json")
         self.expect(result.returncode == FINE, "plugins --json", result.stderr)
@@ -241,7 +253,7 @@ class Test(cli.Findings):
 def main():
     with tempfile.TemporaryDirectory(prefix="rhec-cli-") as work:
         test = Test(Program(sys.argv[1]), pathlib.Path(work).resolve())
-        for part in (test.choices, test.repeats, test.overrides, test.fast_lag, test.others):
+        for part in (test.choices, test.repeats, test.overrides, test.fast_lag, test.limits, test.others):
             part()
         test.tell()
 

@@ -92,6 +92,16 @@ TEST(Robot, NotesExplicitStepsThatCostMuch) {
   EXPECT_THAT(robot("").notes(), testing::IsEmpty());
 }
 
+TEST(Robot, SaysThatASensorIsNotAmongTheUsualOnes) {
+  for (const char* const model : {"", "model: bicycle_slip\n", "model: {name: bicycle_slip, wheelbase: 2}\n"})
+    for (const char* const noise :
+         {"outputs: {yaw_rate: 0.01}", "biases: {yaw_rate: {sigma: 0.01}}", "scales: {yaw_rate: {sigma: 0.01}}"})
+      EXPECT_THAT(
+          error_of([&] { robot(std::string(model) + "noise: {" + noise + "}"); }),
+          testing::AllOf(HasSubstr("yaw_rate: the vehicle could have this sensor"), HasSubstr("model.outputs")));
+  EXPECT_THAT(error_of([] { robot("noise: {biases: {yaw: {sigma: 0.01}}}"); }), HasSubstr("has no option 'yaw'"));
+}
+
 TEST(Robot, NamesThePlaceOfAMistakeInAnySection) {
   for (const char* wrong :
        {"modl: bicycle_slip", "model: bicycle_slp", "noise: {output: {}}", "bounds: {kapa: [0, 1]}",
