@@ -99,9 +99,10 @@ bool Db3Pages::is_cut_within_page() const noexcept {
   return page_size_ > 0 && file_.size() % static_cast<std::int64_t>(page_size_) != 0;
 }
 
+std::int64_t Db3Pages::page_count() const noexcept { return file_.size() / static_cast<std::int64_t>(page_size_); }
+
 bool Db3Pages::read_page(std::int64_t number, std::vector<std::byte>& page) {
-  const std::int64_t pages = file_.size() / static_cast<std::int64_t>(page_size_);
-  if (number < 1 || number > pages) return false;
+  if (number < 1 || number > page_count()) return false;
   file_.seek((number - 1) * static_cast<std::int64_t>(page_size_));
   page.resize(page_size_);
   return file_.read(page);
@@ -110,6 +111,7 @@ bool Db3Pages::read_page(std::int64_t number, std::vector<std::byte>& page) {
 void Db3Pages::read(std::int64_t after, const Take& take) {
   if (page_size_ == 0 || usable_ == 0) return;
   newest_ = after;
+  chained_ = 0;
   // The first page is that of the schema.
   for (std::int64_t number = 2; read_page(number, page_); ++number)
     if (std::to_integer<std::uint8_t>(page_[0]) == leaf_of_table && !take_leaf(take)) return;
@@ -135,7 +137,8 @@ bool Db3Pages::take_leaf(const Take& take) {
   return true;
 }
 
-/// What of it lies in the cell, and what in a chain of pages behind it.
+/// What of it lies in the cell, and what in a chain of pages behind it. Each page of a file is in one chain at most, so
+/// that chains which lead in circles, or which many cells share, end.
 bool Db3Pages::payload_of(std::span<const std::byte> cell, std::uint64_t size) {
   const std::size_t most = usable_ - 35, least = (usable_ - 12) * 32 / 255 - 23;
   std::size_t local = static_cast<std::size_t>(size);
@@ -149,7 +152,8 @@ bool Db3Pages::payload_of(std::span<const std::byte> cell, std::uint64_t size) {
   if (cell.size() < local + 4) return false;
   auto next = static_cast<std::int64_t>(big_endian(cell.subspan(local, 4)));
   while (payload_.size() < size) {
-    if (!read_page(next, further_)) return false;
+    if (chained_ >= page_count() || !read_page(next, further_)) return false;
+    ++chained_;
     const std::size_t part = std::min<std::size_t>(usable_ - 4, static_cast<std::size_t>(size) - payload_.size());
     payload_.insert(payload_.end(), further_.begin() + 4, further_.begin() + 4 + static_cast<std::ptrdiff_t>(part));
     next = static_cast<std::int64_t>(big_endian(std::span(further_).first(4)));

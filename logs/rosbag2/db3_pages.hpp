@@ -30,13 +30,14 @@ class Db3Pages {
   void read(std::int64_t after, const Take& take);
 
  private:
+  std::int64_t page_count() const noexcept;
   bool read_page(std::int64_t number, std::vector<std::byte>& page);
   bool take_leaf(const Take& take);
   bool payload_of(std::span<const std::byte> cell, std::uint64_t size);
 
   InputFile file_;
   std::size_t page_size_ = 0, usable_ = 0;
-  std::int64_t newest_ = 0;
+  std::int64_t newest_ = 0, chained_ = 0;  ///< the last id handed out; pages of chains that were read
   std::vector<std::byte> page_, further_, payload_;
 };
 

@@ -89,5 +89,26 @@ TEST_F(Db3PagesTest, DamagedPagesAreNoHarm) {
   }
 }
 
+/// Chains that lead in circles make no more data than the file has.
+TEST_F(Db3PagesTest, ChainsInCirclesEnd) {
+  constexpr std::size_t page_size = 512, kept = 70;
+  constexpr char leaf = 0x0D, interior = 0x05;
+  std::string content = content_of(table({300, 20000, 20000, 300}, "512")).substr(0, kept * page_size);
+  for (std::size_t number = 2; number <= kept; ++number) {
+    char* const page = content.data() + (number - 1) * page_size;
+    if (*page == leaf || *page == interior) continue;
+    std::memset(page, 0, 3);
+    page[3] = static_cast<char>(number);
+  }
+  std::size_t long_rows = 0, bytes = 0;
+  Db3Pages(write("y.db3", content)).read(0, [&](const Db3Row& row) {
+    long_rows += row.data.size() == 20000;
+    bytes += row.data.size();
+    return true;
+  });
+  EXPECT_EQ(long_rows, 1u) << "one is there; another would need pages twice";
+  EXPECT_LE(bytes, content.size());
+}
+
 }  // namespace db3_pages_test
 }  // namespace rhec::logs
