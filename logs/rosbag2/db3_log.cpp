@@ -60,8 +60,7 @@ class Db3Log final : public MessageLog {
     const Database database = open();
     std::string of_topics;
     for (const auto& [id, topic] : topic_of_id_)
-      if (static_cast<std::size_t>(topic.topic) < wanted.size() && wanted[static_cast<std::size_t>(topic.topic)])
-        of_topics += fmt::format("{}{}", of_topics.empty() ? "" : ",", id);
+      if (is_wanted(topic, wanted)) of_topics += fmt::format("{}{}", of_topics.empty() ? "" : ",", id);
     if (of_topics.empty()) return std::nullopt;
     // In the order of the file, which is that of arrival: sorting would take a large bag's memory.
     const Query query =
@@ -102,6 +101,11 @@ class Db3Log final : public MessageLog {
     bool is_over = false;
   };
 
+  static bool is_wanted(const Place& topic, const std::vector<bool>& wanted) {
+    const auto index = static_cast<std::size_t>(topic.topic);
+    return index < wanted.size() && wanted[index];
+  }
+
   void hand_out(const Db3Row& row, Reading& reading) const {
     const auto topic = topic_of_id_.find(row.topic_id);
     if (topic == topic_of_id_.end()) return;
@@ -128,7 +132,7 @@ class Db3Log final : public MessageLog {
     std::int64_t count = 0;
     pages.read(after, [&](const Db3Row& row) {
       const auto topic = topic_of_id_.find(row.topic_id);
-      if (topic == topic_of_id_.end() || !wanted[static_cast<std::size_t>(topic->second.topic)]) return true;
+      if (topic == topic_of_id_.end() || !is_wanted(topic->second, wanted)) return true;
       ++count;
       hand_out(row, reading);
       return !reading.is_over;

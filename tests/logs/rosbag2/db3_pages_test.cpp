@@ -106,7 +106,7 @@ TEST_F(Db3PagesTest, ChainsInCirclesEnd) {
     bytes += row.data.size();
     return true;
   });
-  EXPECT_EQ(long_rows, 1u) << "one is there; another would need pages twice";
+  EXPECT_EQ(long_rows, 1u) << "the second one is cut, and would need pages twice";
   EXPECT_LE(bytes, content.size());
 }
 
