@@ -63,7 +63,7 @@ void BankHistory::start(Measured outputs, std::int64_t number) noexcept {
 void BankHistory::add(const MeasuredInterval& interval, Measured outputs) noexcept {
   RHEC_ASSERT(newest_ >= 0, "`start` comes first");
   const std::size_t at = place(++newest_);
-  intervals_[at] = {.duration = interval.duration};
+  intervals_[at] = {.way = {.duration = interval.duration, .ends_with_jump = interval.ends_with_jump}};
   between_[at].assign(interval);
   std::copy_n(interval.inputs, nu_, inputs_.data() + at * nu_);
   outputs_[at].assign(outputs);
@@ -73,9 +73,8 @@ void BankHistory::add(const MeasuredInterval& interval, Measured outputs) noexce
 
 /// Over the interval before a node.
 void BankHistory::predict(std::size_t place) noexcept {
-  bank_.predict(between_[place].over(intervals_[place].duration, inputs_.data() + place * nu_),
-                outputs_[place].measured());
-  intervals_[place].distance = bank_.distance();
+  bank_.predict(interval(place), outputs_[place].measured());
+  intervals_[place].way.distance = bank_.distance();
   intervals_[place].between_log_likelihood = bank_.between_log_likelihood();
 }
 
@@ -83,7 +82,7 @@ void BankHistory::rehearse() noexcept {
   if (count_ < 2) return;  // there is no interval yet
   const std::size_t at = place(newest_);
   bank_.save(rehearsed_.data());
-  bank_.predict(between_[at].over(intervals_[at].duration, inputs_.data() + at * nu_), outputs_[at].measured());
+  bank_.predict(interval(at), outputs_[at].measured());
   bank_.update(outputs_[at].measured(), given_weights_.data() + at * ny_);
   bank_.restore(rehearsed_.data());
 }
@@ -148,8 +147,7 @@ bool BankHistory::reweigh(std::int64_t number, const double* robust_weights) noe
 BankHistory::Node BankHistory::node(std::int64_t number) const noexcept {
   RHEC_ASSERT(number <= newest_ && number > newest_ - count_, "a node that is remembered");
   const std::size_t at = place(number);
-  return {.duration = intervals_[at].duration,
-          .distance = intervals_[at].distance,
+  return {.way = intervals_[at].way,
           .inputs = inputs_.data() + at * nu_,
           .outputs = outputs_[at].measured(),
           .between = &between_[at],

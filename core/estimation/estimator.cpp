@@ -276,8 +276,12 @@ bool Estimator::judge_waiting(double until, Clock::time_point deadline) noexcept
     waiting_->drop_front(same);
     const SensorWatch::Finding finding = judge(time, merged_, deadline);
     push_judged(time, merged_.measured());
-    for (int i = 0; finding.release && i < watch_->held_count(); ++i)
-      push_judged(watch_->held()[i].time, watch_->held()[i].outputs.measured());
+    if (finding.release) {
+      for (int i = 0; i < watch_->held_count(); ++i)
+        push_judged(watch_->held()[i].time, watch_->held()[i].outputs.measured());
+      for (const double jump : watch_->jumps()) grid_.push_jump(jump, method_->reach());
+    }
+    if (finding.retract) grid_.retract(watch_->retraction().from, watch_->retraction().outputs);
     bool is_complete = true;
     if (finding.rebase || !watch_->is_active()) is_complete = take_in(time, deadline);
     if (finding.rebase) {

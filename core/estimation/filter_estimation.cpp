@@ -138,14 +138,18 @@ void FilterEstimation::add(const MeasuredInterval& interval, Measured outputs) n
     --remembered_;  // the same node
     return remember();
   }
+  const Eigen::Index nx = model().state_count();
   for (std::size_t i = 0; i < alive_; ++i) {
     KalmanFilter& filter = bank_[i].filter;
     const std::span given(interval.inputs, setup_.noise.input_variances.size());
-    if (memo_ && interval.between == 0 && memo_->prediction.take(given, interval.duration, filter)) continue;
+    const bool is_plain = interval.between == 0 && !interval.ends_with_jump;
+    if (memo_ && is_plain && memo_->prediction.take(given, interval.duration, filter)) continue;
     filter.predict(interval, no_input_.data(), setup_.has_ramps ? ramp_variances_.data() : nullptr, nullptr, outputs);
     bank_[i].log_likelihood += filter.between_log_likelihood();
     for (std::size_t j = 0; !setup_.has_ramps && j < setup_.walk.size(); ++j)
       filter.add_parameter_variance(static_cast<int>(j), setup_.walk[j] * setup_.walk[j]);
+    for (Eigen::Index j = 0; interval.ends_with_jump && j < std::ssize(setup_.walk); ++j)
+      filter.restart_parameter(static_cast<int>(j), setup_.initial_covariance(nx + j, nx + j));
   }
   take(outputs);
   ++newest_;

@@ -25,12 +25,14 @@ NodeGrid::NodeGrid(const Setup& setup)
       outputs_(setup.outputs),
       mean_(setup.inputs, 0.0),
       weight_(setup.inputs, 0.0) {
+  jumps_.reserve(nodes_.size());
   clear();
 }
 
 void NodeGrid::clear() noexcept {
   measurements_.clear();
   inputs_.clear();
+  jumps_.clear();
   count_ = 0;
   dropped_ = 0;
   changed_ = changed_input_ = infinity;
@@ -83,6 +85,30 @@ void NodeGrid::push_input(double time, const double* inputs) noexcept {
   if (count_ > 0 && time < this->time() - setup_.tolerance) changed_input_ = std::min(changed_input_, time);
 }
 
+/// When the interval begins that a time lies in; NaN if its first node is forgotten.
+double NodeGrid::last_node_up_to(double time) const noexcept {
+  std::int64_t number = count_ - 1;
+  while (number >= oldest() && node(number).time > time + setup_.tolerance) --number;
+  return number < oldest() ? missing : node(number).time;
+}
+
+void NodeGrid::push_jump(double time, int reach) noexcept {
+  const double begin = last_node_up_to(time);
+  const std::int64_t kept = last_before(begin);
+  const bool is_lost = kept >= 0 && node(kept).time < lost_;
+  if (std::isnan(begin) || count_ - 1 - kept > reach || is_lost || jumps_.size() == jumps_.capacity()) return;
+  jumps_.insert(std::ranges::upper_bound(jumps_, time), time);
+  changed_ = std::min(changed_, begin);
+}
+
+void NodeGrid::retract(double time, const double* y) noexcept {
+  std::erase_if(jumps_, [&](double jump) { return jump >= time - setup_.tolerance; });
+  for (std::size_t row = measurements_.first_after(time + setup_.tolerance); row < measurements_.size(); ++row)
+    measurements_.remove(row, y);
+  const double begin = last_node_up_to(time);
+  changed_ = std::min(changed_, std::isnan(begin) ? time : begin);
+}
+
 int NodeGrid::outdated(double until, int reach) const noexcept {
   if (count_ == 0) return 0;
   // What is stamped later than `until` waits, even where it lies behind a node.
@@ -128,6 +154,7 @@ void NodeGrid::make_next(double until) noexcept {
     mean_input(last.time, next.time);
   }
   collect(next, from, end);
+  ends_with_jump_ = has_jump(next, end);
   if (count_ == 0) start_ = next.time;
   nodes_[static_cast<std::size_t>(count_++) % nodes_.size()] = next;
 }
@@ -159,6 +186,14 @@ NodeGrid::Node NodeGrid::next_node(const Node& last, std::size_t from, std::size
        row = group_end(row))
     if (++between > setup_.most_between) return {measurements_.time(row), last.grid, Kind::extra, 0};
   return next;
+}
+
+/// Whether the parameters jump between a node and the one that follows it.
+bool NodeGrid::has_jump(const Node& next, std::size_t end) const noexcept {
+  const auto jump = std::ranges::lower_bound(jumps_, next.time - setup_.tolerance);
+  if (jump == jumps_.end()) return false;
+  const std::size_t from = measurements_.first_after(next.time + setup_.tolerance);
+  return from >= end || next_node(next, from, end).time > *jump + setup_.tolerance;
 }
 
 /// What was measured up to a node, and at it; of an output that several rows of one stamp have, the last.
@@ -205,6 +240,7 @@ void NodeGrid::settle(int reach) noexcept {
   if (first < 0) return;
   const double time = node(first).time;
   measurements_.drop_front(measurements_.first_after(time + setup_.tolerance));
+  std::erase_if(jumps_, [&](double jump) { return jump < time - setup_.tolerance; });
   // Of the input rows up to there, only the last one still holds.
   const std::size_t used = inputs_.first_after(time);
   if (used > 1) inputs_.drop_front(used - 1);

@@ -66,7 +66,7 @@ void PlaceBank::follow(const BankHistory& history, std::int64_t from) noexcept {
 }
 
 void PlaceBank::take_node(const BankHistory::Node& before, const BankHistory::Node& node) noexcept {
-  const double change = -std::expm1(-node.distance / setup_.change);
+  const double change = -std::expm1(-node.way.distance / setup_.change);
   if (!knows_) {
     // Nothing has told the two hypotheses from each other: the map's members are what the bank was.
     bank_.forget_weights();
@@ -79,7 +79,7 @@ void PlaceBank::take_node(const BankHistory::Node& before, const BankHistory::No
     probability_ = stays + begins;
     bank_.take_share(begins / probability_, before.mean, before.covariance);
   }
-  bank_.predict(node.between->over(node.duration, node.inputs), node.outputs);
+  bank_.predict(node.between->over(node.way.duration, node.inputs, node.way.ends_with_jump), node.outputs);
   knows_ = bank_.knows_place();
   if (!knows_) return;
   bank_.update(node.outputs, node.robust_weights);
@@ -88,7 +88,7 @@ void PlaceBank::take_node(const BankHistory::Node& before, const BankHistory::No
   const double probability = 1.0 / (1.0 + std::exp(-odds));
   probability_ = std::isfinite(probability) ? std::clamp(probability, least_probability, 1.0 - least_probability)
                                             : least_probability;
-  trust_ += -std::expm1(-node.distance / setup_.trust) * (probability_ - trust_);
+  trust_ += -std::expm1(-node.way.distance / setup_.trust) * (probability_ - trust_);
   trust_ = std::clamp(trust_, least_trust, 1.0 - least_trust);
 }
 

@@ -81,8 +81,9 @@ void PlaceMemory::add_node(BankHistory& history) noexcept {
   // A node may come again, behind late measurements, or later than it was at first.
   if (history.newest() >= advanced_.number) {
     const Advanced before = history.newest() == advanced_.number ? advanced_ : Advanced{};
-    setup_.map->advance(std::max(0.0, node.duration - before.duration), std::max(0.0, node.distance - before.distance));
-    advanced_ = {history.newest(), node.duration, node.distance};
+    setup_.map->advance(std::max(0.0, node.way.duration - before.duration),
+                        std::max(0.0, node.way.distance - before.distance));
+    advanced_ = {history.newest(), node.way.duration, node.way.distance};
   }
   places_.follow(history, history.newest());
   smoother_.work(history, *setup_.map);

@@ -99,17 +99,16 @@ void PlaceSmoother::step_back(BankHistory& history, SlipMap& map) noexcept {
   law_ = law;
   std::fill(weights_.begin() + members, weights_.end(), 0.0);
   bank.add_saved_weights(node.filtered, weights_.data() + members);
-  look_back(weights_.data(), weights_.data() + members, members, -std::expm1(-after.distance / law_memory));
+  look_back(weights_.data(), weights_.data() + members, members, -std::expm1(-after.way.distance / law_memory));
   bank.saved_moments(node.filtered, law_, filtered_, filtered_covariance_);
-  for (int j = 0; j < np_; ++j)
-    bank.write_process(law_, j, after.duration, after.distance, model_->process_data(j, data_.data()));
+  for (int j = 0; j < np_; ++j) bank.write_process(law_, j, after.way, model_->process_data(j, data_.data()));
   std::fill(input_.begin(), input_.end(), 0.0);
   for (int j = 0; j < nu_; ++j)
     if (!std::isnan(after.inputs[j])) input_[j] = after.inputs[j];
   model_->integrate({.count = 1,
                      .states = filtered_.data(),
                      .inputs = input_.data(),
-                     .durations = &after.duration,
+                     .durations = &after.way.duration,
                      .data = data_.data(),
                      .substeps = setup_.substeps,
                      .next_states = predicted_mean_.data(),

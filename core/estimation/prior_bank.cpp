@@ -93,6 +93,22 @@ double variance_off_course(const Prior& prior, double duration, double distance)
   return std::isfinite(halfway) ? 4.0 * std::max(halfway, 0.0) : 0.0;
 }
 
+/// F and Q of a process over a way. Where it ends with a jump, the value has the variance of its start there besides;
+/// its level and its derivatives stay.
+void advance(const Prior& prior, double way, bool ends_with_jump, double* F, double* Q) noexcept {
+  prior.advance(way, F, Q);
+  if (!ends_with_jump) return;
+  std::array<double, Prior::max_states> mean;
+  std::array<double, std::size_t{Prior::max_states} * Prior::max_states> covariance;
+  prior.start(mean.data(), covariance.data());
+  Q[0] += covariance[0];
+}
+
+/// Up to a jump a parameter is held.
+bool is_ramp(const Prior& prior, bool ends_with_jump) noexcept {
+  return prior.course() == Course::ramp && !ends_with_jump;
+}
+
 }  // namespace
 
 int PriorBank::first_state(int parameter) const noexcept { return processes_[parameter].first; }
@@ -137,7 +153,6 @@ PriorBank::PriorBank(std::shared_ptr<const Model> model, Setup setup)
     process.ramp.assign(lanes_, 0.0);
     process.offset.assign(setup_.map ? lanes_ : 0, 0.0);
     process.off_course.assign(looks_ahead() ? lanes_ : 0, 0.0);
-    for (int m = 0; m < members_; ++m) process.ramp[m] = setup_.members[m][j]->course() == Course::ramp ? 1.0 : 0.0;
     n_ += process.count;
     processes_.push_back(std::move(process));
   }
@@ -465,17 +480,19 @@ void PriorBank::find_distance(const double* input, double duration) noexcept {
 }
 
 /// F and Q of every process over the interval.
-void PriorBank::advance_processes(double duration) noexcept {
+void PriorBank::advance_processes(double duration, bool ends_with_jump) noexcept {
   for (Process& process : processes_) {
     for (std::size_t kind = 0; kind < process.kinds.size(); ++kind) {
       const Prior& prior = *process.kinds[kind];
-      prior.advance(prior.along() == Along::time ? duration : distance_, own_.data(), own_covariance_.data());
+      advance(prior, prior.along() == Along::time ? duration : distance_, ends_with_jump, own_.data(),
+              own_covariance_.data());
       const Filling filling{prior, process.place, process.filler, process.count};
       filling.transition(own_.data(), filled_.data());
       filling.covariance(own_covariance_.data(), filled_covariance_.data());
       const double off_course = ahead_ && members_ > 1 ? variance_off_course(prior, duration, distance_) : 0.0;
       for (int m = 0; m < lanes_; ++m) {
         if (process.kind_of[std::min(m, members_ - 1)] != static_cast<int>(kind)) continue;
+        process.ramp[m] = is_ramp(prior, ends_with_jump) ? 1.0 : 0.0;
         if (ahead_) process.off_course[m] = off_course;
         for (int e = 0; e < process.count * process.count; ++e) {
           process.F[e * lanes_ + m] = filled_[e];
@@ -500,23 +517,17 @@ void PriorBank::mix_members() noexcept {
   for (int m = 0; m < members_; ++m) weights_[m] = (1.0 - change) * weights_[m] + each;
 }
 
-void PriorBank::predict(const double* measured_input, double duration) noexcept {
-  begin_step(measured_input, duration);
-  take_step(duration);
-  keep_near_bounds();
-}
-
 /// All that an interval asks for before the members move: inputs, ground, processes, and another law.
-void PriorBank::begin_step(const double* measured_input, double duration) noexcept {
+void PriorBank::begin_step(const MeasuredInterval& interval) noexcept {
   for (int j = 0; j < nu_; ++j) {
-    const bool missing = std::isnan(measured_input[j]);
+    const bool missing = std::isnan(interval.inputs[j]);
     const double wide = unknown_sigma(model_->description().inputs[j]);
-    input_[j] = missing ? 0.0 : measured_input[j];
+    input_[j] = missing ? 0.0 : interval.inputs[j];
     variances_[j] = missing ? wide * wide : setup_.input_variances[j];
   }
   between_log_likelihood_ = 0.0;
-  find_distance(input_.data(), duration);
-  advance_processes(duration);
+  find_distance(input_.data(), interval.duration);
+  advance_processes(interval.duration, interval.ends_with_jump);
   if (setup_.map) follow_map();
   if (members_ > 1) mix_members();
 }
@@ -556,11 +567,6 @@ void PriorBank::integrate_members(const double* mean, bool is_wide, double secon
     for (int r = 0; r < nx_; ++r) next_[r * lanes_ + m] = next_rows_[m * nx_ + r];
     for (int e = 0; e < nx_ * columns; ++e) jacobian_[e * lanes_ + m] = jacobian_rows_[m * nx_ * columns + e];
   }
-}
-
-void PriorBank::take_step(double duration) noexcept {
-  integrate_members(mean_.data(), false, duration, 1.0);
-  take_linearised_step();
 }
 
 /// The moments at the interval's end, by the next states and the Jacobian of `integrate_members`.
@@ -634,15 +640,16 @@ void PriorBank::saved_moments(const double* state, int member, Eigen::VectorXd& 
   }
 }
 
-void PriorBank::write_process(int member, int parameter, double duration, double distance, double* data) noexcept {
+void PriorBank::write_process(int member, int parameter, const ProcessInterval& way, double* data) noexcept {
   const Prior& prior = *setup_.members[member][parameter];
   const int count = processes_[parameter].count;
   std::array<int, Prior::max_states> places{};
   const int own = own_places(member, parameter, places.data());
-  prior.advance(prior.along() == Along::time ? duration : distance, own_.data(), own_covariance_.data());
+  advance(prior, prior.along() == Along::time ? way.duration : way.distance, way.ends_with_jump, own_.data(),
+          own_covariance_.data());
   double *F = data + 1, *L = F + count * count;
   std::fill_n(data, 1 + 2 * count * count, 0.0);
-  data[0] = prior.course() == Course::ramp ? 1.0 : 0.0;
+  data[0] = is_ramp(prior, way.ends_with_jump) ? 1.0 : 0.0;
   // The Cholesky factor of a covariance that may be singular: what no pivot is left for is determined by those before.
   for (int c = 0; c < own; ++c) {
     const auto at = [&](int r, int k) -> double& { return L[places[k] * count + places[r]]; };

@@ -27,9 +27,13 @@ void PriorBank::predict(const MeasuredInterval& measured, Measured end_outputs) 
   is_curved_ = false;
   std::ranges::fill(added_, 0.0);
   const bool has_motion = measures_motion(setup_.motion_outputs, measured, static_cast<std::size_t>(ny_), end_outputs);
-  if (measured.between == 0 && !has_motion) return predict(measured.inputs, measured.duration);
+  begin_step(measured);
+  if (measured.between == 0 && !has_motion) {
+    integrate_members(mean_.data(), false, measured.duration, 1.0);
+    take_linearised_step();
+    return keep_near_bounds();
+  }
   RHEC_ASSERT(!wide_mean_.empty(), "a bank that was set up for measurements between nodes");
-  begin_step(measured.inputs, measured.duration);
   widen();
   if (ahead_) ahead_->end_outputs = end_outputs;
   const MeasuredInterval interval = has_motion ? look_ahead(measured, end_outputs) : measured;

@@ -123,7 +123,7 @@ void PriorHorizonEstimation::choose_law() noexcept {
 void PriorHorizonEstimation::fill_interval(int interval, std::int64_t number) noexcept {
   const BankHistory::Node node = filters_.history().node(number);
   const int nu = model().input_count();
-  problem_.set_duration(interval, node.duration);
+  problem_.set_duration(interval, node.way.duration);
   double* const inputs = problem_.measured_input(interval);
   std::copy_n(node.inputs, nu, inputs);
   std::fill(inputs + nu, inputs + process_model_->input_count(), 0.0);
@@ -131,10 +131,10 @@ void PriorHorizonEstimation::fill_interval(int interval, std::int64_t number) no
   problem_.between(interval).assign(*node.between);
   const auto place = static_cast<std::size_t>(number % static_cast<std::int64_t>(advances_.size()));
   double* const data = known_data_.data() + place * process_model_->data_count();
-  const Advance advance{number, law_, node.duration, node.distance};
+  const Advance advance{number, law_, node.way};
   if (advances_[place] != advance) {
     for (int j = 0; j < model().parameter_count(); ++j)
-      filters_.history().bank().write_process(law_, j, node.duration, node.distance, processes().process_data(j, data));
+      filters_.history().bank().write_process(law_, j, node.way, processes().process_data(j, data));
     advances_[place] = advance;
   }
   std::copy_n(data, process_model_->data_count(), problem_.interval_data(interval));

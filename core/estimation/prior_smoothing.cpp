@@ -85,7 +85,7 @@ class LawProblem {
   void set_distances(const std::vector<double>& distances) noexcept {
     for (int i = 0; i < problem_.intervals(); ++i)
       for (int j = 0; j < vehicle().parameter_count(); ++j)
-        bank_.write_process(0, j, problem_.duration(i), distances[static_cast<std::size_t>(i)],
+        bank_.write_process(0, j, {problem_.duration(i), distances[static_cast<std::size_t>(i)]},
                             model_->process_data(j, problem_.interval_data(i)));
     problem_.finish();
   }

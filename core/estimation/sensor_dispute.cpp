@@ -29,6 +29,8 @@ constexpr double impossible = 3.0;
 constexpr double probable = 0.9;
 // Slip that has jumped within an interval displaces the vehicle by at least this share of it on the next one again.
 constexpr double goes_on_by = 0.8;
+// So many samples behind slip that was found to have jumped what is disputed may be the same that it was.
+constexpr int soon = 2;
 // Slip that has changed within the gates has done so by this many samples ago.
 constexpr int changed_before[] = {3, 6};
 // A hypothesis that has explained so many samples in a row has learnt how the vehicle moves.
@@ -148,6 +150,45 @@ double SensorWatch::likelihood(WalkingFilter& filter, bool with_rejected) noexce
   return sum;
 }
 
+/// Where no slip within its bounds explains what follows slip that was found to have jumped, that has not: the sensor
+/// has left in steps, and was wrong from the first on. The filter then goes on as if it had said nothing.
+bool SensorWatch::retract_slip() noexcept {
+  Memory& memory = *memory_;
+  const bool is_slip = slip_->is_active && memory.is_slip_possible;
+  if (disputed_samples_ != 1 || is_slip || memory.since_release > soon || !is_position_disputed()) return false;
+  int ago = 0;
+  while (ago < memory.connected && memory.entry(ago).time > memory.released_from) ++ago;
+  if (ago == memory.connected) return false;
+  for (std::size_t s = 0; s < sensors_.size(); ++s)
+    for (const int j : sensors_[s].outputs)
+      memory.retracted[j] = (findings_[s] & reason::rejected) ? raw_[j] : Memory::unknown;
+  WalkingFilter& filter = own_->filter;
+  filter.mean() = memory.entry(ago).mean;
+  filter.covariance() = memory.entry(ago).covariance;
+  for (; ago > 0; --ago) {
+    Memory::Entry& next = memory.entry(ago - 1);
+    filter.predict(memory.entry(ago).inputs.data(), next.time - memory.entry(ago).time);
+    next.outputs.remove(memory.retracted.data());
+    filter.update(next.outputs.measured());
+    copy_numbers(filter.mean(), next.mean);
+    copy_numbers(filter.covariance(), next.covariance);
+  }
+  memory.before_mean = filter.mean();
+  memory.before_covariance = filter.covariance();
+  filter.predict(input_.data(), memory.duration);
+  filter.expect();
+  if (slip_->is_active) refute(*slip_);
+  return true;
+}
+
+SensorWatch::Retraction SensorWatch::retraction() const noexcept {
+  return {memory_->released_from, memory_->retracted.data()};
+}
+
+std::span<const double> SensorWatch::jumps() const noexcept {
+  return {memory_->jumps.data(), static_cast<std::size_t>(memory_->jump_count)};
+}
+
 void SensorWatch::confront(Hypothesis& hypothesis, const double* outputs, bool counts) noexcept {
   if (!fits(hypothesis.filter, outputs)) {
     refute(hypothesis);
@@ -203,12 +244,9 @@ bool SensorWatch::consider_slip_before() noexcept {
   if (disputed_samples_ != 1 || !is_position_disputed() || memory_->offsets->is_probable()) return false;
   // After a gap there is little to be used anew.
   if (std::ranges::any_of(records_, [](const Record& each) { return each.after_gap; })) return false;
-  const std::vector<Memory::Entry>& entries = memory_->entries;
+  const auto entry = [this](int ago) -> const Memory::Entry& { return memory_->entry(ago); };
   for (const int back : changed_before) {
     if (back >= memory_->connected) return false;
-    const auto entry = [&](int ago) -> const Memory::Entry& {
-      return entries[(memory_->newest + entries.size() - static_cast<std::size_t>(ago)) % entries.size()];
-    };
     WalkingFilter& filter = slip_->filter;
     filter.mean() = entry(back).mean;
     filter.covariance() = entry(back).covariance;
@@ -218,8 +256,9 @@ bool SensorWatch::consider_slip_before() noexcept {
       filter.update(entry(ago - 1).outputs.measured());
     }
     filter.predict(input_.data(), memory_->duration);
-    memory_->has_slip_changed_before = is_within_bounds(filter) && fits(filter, raw_.data());
-    if (memory_->has_slip_changed_before) return true;
+    if (!is_within_bounds(filter) || !fits(filter, raw_.data())) continue;
+    memory_->jumps[0] = entry(back).time;
+    return true;
   }
   return false;
 }
@@ -232,7 +271,8 @@ double SensorWatch::consider_slip() noexcept {
   if (is_new) {
     start(*slip_);
     held_count_ = 0;
-    memory_->has_slip_changed_before = false;
+    memory_->jump_count = 1;
+    memory_->jumps[0] = memory_->entry(0).time;
     const bool explains = disputed_nis(slip_->filter) <= left_unexplained * disputed_nis(own_->filter) &&
                           fits(slip_->filter, raw_.data());
     if (!explains && !consider_slip_before()) {
@@ -245,6 +285,8 @@ double SensorWatch::consider_slip() noexcept {
     copy_numbers(slip_->filter.mean(), memory_->before_slip);
     slip_->filter.update(weighed(raw_.data()));
     memory_->is_slip_possible = slip_beyond() < impossible;
+    memory_->jumps[1] = memory_->entry(0).time;
+    memory_->jump_count = 2;
     edge_->is_active = false;
     return new_likelihood;
   }
@@ -281,7 +323,9 @@ SensorWatch::Finding SensorWatch::settle(double time, const double* outputs) noe
     own_->filter.update(weighed(outputs));
     return accept(*own_);
   }
-  consider_moved(consider_slip());
+  const double likelihood_of_new_slip = consider_slip();
+  const bool retracts = retract_slip();
+  consider_moved(likelihood_of_new_slip);
   think_again();
   if (!is_blind_) {
     if (!blind_->is_active) start(*blind_);
@@ -293,13 +337,15 @@ SensorWatch::Finding SensorWatch::settle(double time, const double* outputs) noe
   // Slip that would have to leave its bounds for what a compass says explains nothing of it.
   const bool may_be_slip = is_position_disputed() || is_within_bounds(slip_->filter);
   if (may_be_slip && slip_->explained >= (has_begun_with_it ? setup_.slip_proof : setup_.proof)) {
-    Finding finding = accept(*slip_);
+    // What has explained much, or follows a gap, is not doubted for what comes next.
+    const bool is_doubtful = slip_->explained < setup_.proof &&
+                             std::ranges::none_of(records_, [](const Record& each) { return each.after_gap; });
+    memory_->since_release = is_doubtful ? 0 : soon;
+    memory_->released_from = memory_->jumps[0];
+    accept(*slip_);
     for (Record& record : records_) record = {};
     acquit(outputs);
-    // What the estimator has made of the samples before is wrong, too, where slip had changed before.
-    finding.rebase = memory_->has_slip_changed_before;
-    finding.release = !finding.rebase;
-    return finding;
+    return {.release = true};
   }
   if (slip_->is_active) hold_back(time, outputs);
   bool after_gap = true;
@@ -330,7 +376,7 @@ SensorWatch::Finding SensorWatch::settle(double time, const double* outputs) noe
     for (Record& record : records_) record = {};
     return accept(*blind_);
   }
-  return {};
+  return {.retract = retracts};
 }
 
 bool SensorWatch::is_within_bounds(const WalkingFilter& filter) const noexcept {
@@ -381,7 +427,7 @@ SensorWatch::Finding SensorWatch::accept(Hypothesis& hypothesis) noexcept {
   go_on_from(hypothesis.filter, own_->filter);
   if (&hypothesis != slip_.get()) memory_->offsets->forget_onsets();
   end_dispute();
-  return {.release = false, .rebase = true};
+  return {.rebase = true};
 }
 
 /// Where a sensor that has moved does not explain what follows, the heading may be wrong, too, e.g. after a turn

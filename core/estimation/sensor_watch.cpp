@@ -132,7 +132,7 @@ SensorWatch::SensorWatch(std::shared_ptr<const Model> model, const Setup& setup)
     entry.outputs = MeasuredOutputs(model->output_count());
   }
   raw_.assign(model->output_count(), Memory::unknown);
-  memory_->first_errors = raw_;
+  memory_->first_errors = memory_->retracted = raw_;
   input_.assign(model->input_count(), 0.0);
   believed_input_ = input_;
   held_.assign(held_capacity, {0.0, MeasuredOutputs(model->output_count())});
@@ -265,6 +265,7 @@ Measured SensorWatch::weighed(const double* outputs) const noexcept {
 }
 
 SensorWatch::Finding SensorWatch::judge(double time, double* outputs, const double* weights) noexcept {
+  if (memory_->since_release < std::numeric_limits<int>::max()) ++memory_->since_release;
   memory_->has_advanced = false;
   std::fill(findings_.begin(), findings_.end(), 0u);
   held_count_ = is_disputed_ ? held_count_ : 0;
@@ -360,7 +361,7 @@ SensorWatch::Finding SensorWatch::judge(double time, double* outputs, const doub
       }
     }
     // The estimator's own knowledge of the motion is wrong.
-    if (is_blind_ || is_unobserved_) finding = {.release = false, .rebase = true};
+    if (is_blind_ || is_unobserved_) finding = {.rebase = true};
     is_unobserved_ = false;
     if (finding.rebase) start_search(outputs);
     if (finding.rebase) memory_->connected = 0;
@@ -470,7 +471,7 @@ SensorWatch::Finding SensorWatch::search_heading(const double* outputs) noexcept
   memory_->search->update(sensors_, weighed(outputs));
   own_->filter.mean() = memory_->search->best().mean();
   own_->filter.covariance() = memory_->search->best().covariance();
-  return {.release = false, .rebase = true};
+  return {.rebase = true};
 }
 
 /// Sensors whose values are off by what is known, and taken out of them.

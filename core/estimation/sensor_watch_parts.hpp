@@ -50,6 +50,9 @@ struct SensorWatch::Memory {
   };
   std::vector<Entry> entries{remembered_samples};
   std::size_t newest = 0;
+  Entry& entry(int ago) noexcept {
+    return entries[(newest + entries.size() - static_cast<std::size_t>(ago)) % entries.size()];
+  }
   std::int64_t count = 0;
   std::int64_t connected = 0;  ///< of the newest, by what moves and by what is measured
   // Before the last advance, and that.
@@ -60,8 +63,12 @@ struct SensorWatch::Memory {
   bool was_calm = true;        ///< health was ok when the dispute began, and there had been none for some time
   bool was_open = false;       ///< what was disputed at the last sample was probably slip, and nothing was said of it
   int undisputed_samples = 0;  ///< in a row
-  bool has_slip_changed_before = false;  ///< slip that explains what is disputed has changed some samples ago
-  bool is_slip_possible = false;         ///< slip that explains what is disputed is within its bounds
+  std::array<double, 2> jumps{};                        ///< behind which slip has been made anew for what is disputed
+  int jump_count = 0;                                   ///< of these
+  int since_release = std::numeric_limits<int>::max();  ///< samples since slip was found to have jumped
+  double released_from = unknown;                       ///< behind this time
+  std::vector<double> retracted;                        ///< n_y, not missing of outputs that were wrong then
+  bool is_slip_possible = false;                        ///< slip that explains what is disputed is within its bounds
   StuckValues stuck;
   std::unique_ptr<OffsetWatch> offsets;
   std::unique_ptr<WalkingFilter> trial;   ///< for what is tried within one call

@@ -1,6 +1,8 @@
 #include "rhec/core/estimation/stamped_rows.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 
 namespace rhec {
 
@@ -49,6 +51,11 @@ std::size_t MeasuredRows::insert(double time, Measured measured) noexcept {
     row_[outputs_ + j] = measured.weight(j);
   }
   return StampedRows::insert(time, row_.data());
+}
+
+void MeasuredRows::remove(std::size_t i, const double* y) noexcept {
+  for (int j = 0; j < outputs_; ++j)
+    if (!std::isnan(y[j])) values(i)[j] = std::numeric_limits<double>::quiet_NaN();
 }
 
 }  // namespace rhec

@@ -49,6 +49,7 @@ class Truth {
     distance_ += speed * parameters_[0] * step_;
     time_ += step_;
   }
+  double slip() const { return parameters_[0]; }  ///< of the last interval
   Eigen::VectorXd state;
   std::vector<double> inputs;
 
@@ -105,6 +106,7 @@ Episode drive_with_fault(const Robot& robot, const Fault& fault, std::uint64_t s
     for (std::size_t j = 0; j < delivery.outputs.size(); ++j)
       delivery.outputs[j] += robot.output_sigmas()[j] * noise(random);
     const Eigen::Vector2d place(truth.state[roles.position_x] + moved, truth.state[roles.position_y]);
+    const double slip = truth.slip();
     truth.advance(speed, since >= 0 ? fault.slip : 0.0);
     delivery.inputs = truth.inputs;
     for (std::size_t j = 0; j < delivery.inputs.size(); ++j)
@@ -130,7 +132,9 @@ Episode drive_with_fault(const Robot& robot, const Fault& fault, std::uint64_t s
                         estimate.covariance.allFinite();
     std::vector<Episode::Sample>& part = since < 0 ? episode.before : is_on ? episode.during : episode.after;
     part.push_back({error.norm(), error.dot(P.ldlt().solve(error)) < within, estimate.health.level,
-                    estimator->watch() ? in_words(estimate.health, estimator->watch()->sensors()) : ""});
+                    estimator->watch() ? in_words(estimate.health, estimator->watch()->sensors()) : "",
+                    estimate.parameters[0] - slip,
+                    std::sqrt(estimate.covariance(model.state_count(), model.state_count()))});
   }
   episode.counts = estimator->counts();
   return episode;

@@ -36,7 +36,9 @@ struct Episode {
     double error = 0.0;  ///< of the position, in the world as it is from the fault on [m]
     bool inside = true;  ///< whether the position is within three standard deviations of the estimate
     HealthLevel health = HealthLevel::ok;
-    std::string words = {};  ///< the health's
+    std::string words = {};   ///< the health's
+    double slip_error = 0.0;  ///< of the first parameter
+    double slip_sigma = 0.0;  ///< and its standard deviation
   };
   std::vector<Sample> before, during, after;
   Estimator::Counts counts;

@@ -99,7 +99,7 @@ TEST(BankHistory, ForgetsWhatIsOlderThanItsNodes) {
   EXPECT_TRUE(history.amend(3, samples[7].outputs.data()));
   EXPECT_FALSE(history.amend(4, samples[6].outputs.data()));
   EXPECT_FALSE(history.amend(-1, samples[6].outputs.data()));
-  EXPECT_EQ(history.node(17).duration, samples[10].duration);
+  EXPECT_EQ(history.node(17).way.duration, samples[10].duration);
 }
 
 /// A robust loss holds a fix back that is far off; the rest goes on as it was.

@@ -64,6 +64,31 @@ TEST(FilterEstimation, TrustsTheInitialHeadingWithOneStart) {
   EXPECT_LT(heading_error(one, 1.6, 40), 0.05);
 }
 
+/// What was known of the parameters ends where they jump; what is known of the vehicle does not.
+TEST(FilterEstimation, KnowsNothingOfParametersThatHaveJumped) {
+  const std::shared_ptr<const Model> model = host().make_model("bicycle_slip");
+  const FilterEstimation::Setup setup = bicycle_setup(0.0, 0.05, 1);
+  FilterEstimation filter(model, setup);
+  filter.reset();
+  const double inputs[] = {2.0, 0.0}, nothing[] = {nan, nan, nan};
+  Estimate before = empty_estimate(*model), after = before;
+  filter.start(std::vector{0.0, 0.0, 0.0}.data());
+  for (int k = 1; k <= 20; ++k) filter.add_node(0.2, inputs, std::vector{0.32 * k, 0.0, 0.0}.data());
+  filter.add({.duration = 0.2, .inputs = inputs}, nothing);
+  filter.estimate(before, Clock::time_point::max());
+  filter.rewind(1);
+  filter.add({.duration = 0.2, .inputs = inputs, .ends_with_jump = true}, nothing);
+  filter.estimate(after, Clock::time_point::max());
+  ASSERT_LT(before.covariance(4, 4), 0.5 * setup.initial_covariance(4, 4));
+  for (int j = 4; j < 6; ++j) {
+    EXPECT_EQ(after.covariance(j, j), setup.initial_covariance(j, j));
+    EXPECT_EQ(after.covariance.col(j).head(4).norm(), 0.0);
+  }
+  EXPECT_EQ(after.parameters, before.parameters);
+  EXPECT_EQ(after.state, before.state);
+  EXPECT_EQ(after.covariance.topLeftCorner(4, 4), before.covariance.topLeftCorner(4, 4));
+}
+
 TEST(FilterEstimation, TakesLateOutputsAtTheNodesThatItRemembers) {
   const auto model = linear_model<Trolley>();
   const auto samples = simulate(*model, 5, true, 4);

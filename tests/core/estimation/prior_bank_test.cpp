@@ -47,7 +47,7 @@ class DenseFilter {
     }
   }
 
-  void predict(const Sample& sample, const std::vector<double>& input_variances) {
+  void predict(const Sample& sample, const std::vector<double>& input_variances, bool ends_with_jump = false) {
     const int nu = model_.input_count();
     std::vector<double> input(nu), variances(nu);
     for (int j = 0; j < nu; ++j) {
@@ -60,6 +60,12 @@ class DenseFilter {
       const int count = priors_[j]->state_count();
       Eigen::MatrixXd block(count, count), noise(count, count);
       priors_[j]->advance(sample.duration, block.data(), noise.data());
+      if (ends_with_jump) {
+        Eigen::VectorXd start(count);
+        Eigen::MatrixXd P(count, count);
+        priors_[j]->start(start.data(), P.data());
+        noise(0, 0) += P(0, 0);
+      }
       F.block(first_[j], first_[j], count, count) = block;
       Q.block(first_[j], first_[j], count, count) = noise;
     }
@@ -68,7 +74,7 @@ class DenseFilter {
       Eigen::VectorXd to = F * from + w, x(nx_), p(np_), end(np_);
       for (int j = 0; j < np_; ++j) {
         p[j] = from[first_[j]];
-        end[j] = priors_[j]->course() == Course::ramp ? to[first_[j]] : p[j];
+        end[j] = priors_[j]->course() == Course::ramp && !ends_with_jump ? to[first_[j]] : p[j];
       }
       const Eigen::VectorXd start = from.head(nx_);
       model_.integrate({.count = 1,
@@ -159,9 +165,10 @@ TEST(PriorBank, IsTheKalmanFilterOfItsPriorOnALinearModel) {
     Eigen::VectorXd mean;
     Eigen::MatrixXd covariance;
     for (int k = 0; k <= 60; ++k) {
+      const bool jumps = k == 20 || k == 21 || k == 50;
       if (k > 0) {
-        reference.predict(samples[k], setup.input_variances);
-        bank.predict(samples[k].inputs.data(), samples[k].duration);
+        reference.predict(samples[k], setup.input_variances, jumps);
+        bank.predict({.duration = samples[k].duration, .inputs = samples[k].inputs.data(), .ends_with_jump = jumps});
       }
       reference.update(samples[k], setup.output_variances);
       bank.update(samples[k].outputs.data());

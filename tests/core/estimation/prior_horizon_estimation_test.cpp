@@ -71,7 +71,7 @@ double difference(const Estimate& a, const Eigen::VectorXd& mean, const Eigen::M
 class OneMember : public ::testing::TestWithParam<int> {};
 
 /// Of a linear problem without bounds the window is the Kalman filter of its prior: at any horizon, growing and
-/// sliding.
+/// sliding, and with parameters that jump.
 TEST_P(OneMember, IsTheKalmanFilterOfItsPrior) {
   const auto model = linear_model<Hovercraft>();
   const auto samples = samples_of(*model, 60, 5);
@@ -86,8 +86,11 @@ TEST_P(OneMember, IsTheKalmanFilterOfItsPrior) {
       if (k == 0) {
         window.start(samples[k].outputs.data());
       } else {
-        filter.predict(samples[k].inputs.data(), samples[k].duration);
-        window.add_node(samples[k].duration, samples[k].inputs.data(), samples[k].outputs.data());
+        const MeasuredInterval interval{.duration = samples[k].duration,
+                                        .inputs = samples[k].inputs.data(),
+                                        .ends_with_jump = k == 20 || k == 21 || k == 50};
+        filter.predict(interval);
+        window.add(interval, samples[k].outputs.data());
       }
       filter.update(samples[k].outputs.data());
       window.estimate(estimate, Clock::time_point::max());

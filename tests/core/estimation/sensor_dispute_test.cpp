@@ -126,6 +126,23 @@ TEST_P(SensorDisputes, SlipThatJumpsIsNoFault) {
   });
 }
 
+/// Who knows that slip has jumped forgets what it was, so that slip is known anew at the sample that confirms it; and
+/// no law by which slip varies much is believed for that.
+TEST_P(SensorDisputes, SlipThatHasJumpedIsKnownAtOnce) {
+  const Fault fault{.spoil = {}, .length = 20, .moved = 0.0, .slip = 0.35};
+  for (const std::uint64_t seed : {2U, 3U, 6U, 7U, 10U, 11U}) {  // 6 and 8 m/s: the first fix fails its gate
+    SCOPED_TRACE(seed);
+    const Episode episode = drive_with_fault(vehicle, fault, seed);
+    const double usual_sigma = episode.before.back().slip_sigma;
+    EXPECT_GT(std::abs(episode.during[1].slip_error), 0.3);
+    EXPECT_GT(episode.during[1].slip_sigma, 5.0 * usual_sigma) << "it is open whether slip has jumped";
+    for (std::size_t k = 2; k < 8; ++k) {
+      EXPECT_LT(std::abs(episode.during[k].slip_error), 0.05) << k;
+      EXPECT_LT(episode.during[k].slip_sigma, 2.0 * usual_sigma) << k;
+    }
+  }
+}
+
 /// A vehicle that moves twice as far as its wheels is not explained by slip within its bounds.
 TEST_P(SensorDisputes, SlipThatWouldHaveToLeaveItsBoundsIsSaid) {
   const Fault fault{.spoil = [](Delivery& d) { d.inputs[0] *= 0.4; }, .length = 40};
@@ -186,6 +203,28 @@ TEST_P(SensorDisputes, APositionThatLeavesInTwoStepsIsNotSlip) {
                   EXPECT_LE(episode.samples_to_recover(usual_error), 10);
                 });
   }
+}
+
+/// One that goes on for two samples just as a vehicle would whose slip has jumped is believed. What it has said is
+/// taken back once no slip explains the third: position and slip are what they would be without it.
+TEST_P(SensorDisputes, SlipThatDoesNotGoOnIsTakenBack) {
+  int believed = 0;
+  for (const double size : {0.8, 1.0, 1.2})
+    for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+      SCOPED_TRACE(size);
+      SCOPED_TRACE(seed);
+      const Fault fault{.spoil = [=](Delivery& d) { d.outputs[0] += (d.since + 1) * size; }, .length = 2};
+      const Episode episode = drive_with_fault(vehicle, fault, seed, 10);
+      const double slip_before = std::abs(episode.before.back().slip_error);
+      if (std::abs(episode.during[1].slip_error) < slip_before + 0.2) continue;
+      ++believed;
+      EXPECT_GT(episode.during[1].error, size);
+      EXPECT_LT(episode.after[0].error, 2.0 * usual_error) << "three samples without a position";
+      EXPECT_TRUE(episode.after[0].inside);
+      EXPECT_LT(std::abs(episode.after[0].slip_error), slip_before + 0.05);
+      EXPECT_EQ(episode.after[0].health, HealthLevel::degraded);
+    }
+  EXPECT_GE(believed, 5);
 }
 
 TEST_P(SensorDisputes, APositionThatWasFollowedIsDoubtedForSomeTime) {

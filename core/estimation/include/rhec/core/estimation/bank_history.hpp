@@ -48,8 +48,8 @@ class RHEC_EXPORT BankHistory {
   int capacity() const noexcept { return static_cast<int>(intervals_.size()); }
 
   struct Node {
-    double duration = 0.0, distance = 0.0;  ///< of the interval before the node [s, m]
-    const double* inputs;                   ///< n_u on that interval
+    ProcessInterval way;   ///< the interval before the node
+    const double* inputs;  ///< n_u on it
     Measured outputs;
     const BetweenNodes* between;                          ///< of that interval
     const double* predicted;                              ///< PriorBank::save before the outputs were used
@@ -63,14 +63,18 @@ class RHEC_EXPORT BankHistory {
 
  private:
   struct Interval {
-    double duration = 0.0, distance = 0.0, log_likelihood = 0.0;
-    double between_log_likelihood = 0.0;  ///< part of it
+    ProcessInterval way = {};
+    double log_likelihood = 0.0, between_log_likelihood = 0.0;  ///< the one contains the other
   };
   std::size_t place(std::int64_t number) const noexcept {
     return static_cast<std::size_t>(number % static_cast<std::int64_t>(intervals_.size()));
   }
   void begin_node() noexcept;
   void predict(std::size_t place) noexcept;
+  MeasuredInterval interval(std::size_t place) const noexcept {
+    const ProcessInterval& way = intervals_[place].way;
+    return between_[place].over(way.duration, inputs_.data() + place * nu_, way.ends_with_jump);
+  }
   void update(std::size_t place) noexcept;
   void go_on(std::size_t place) noexcept;
   void begin_again(std::int64_t number) noexcept;

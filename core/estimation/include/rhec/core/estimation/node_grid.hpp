@@ -39,6 +39,12 @@ class RHEC_EXPORT NodeGrid {
   /// `reach`: how many of the newest nodes can be taken back now.
   Place push_measurement(double time, Measured outputs, int reach) noexcept;
   void push_input(double time, const double* inputs) noexcept;
+  /// The parameters have jumped soon after a time: at the last node up to there. Nothing happens if that is out of
+  /// reach.
+  void push_jump(double time, int reach) noexcept;
+  /// Takes back the jumps from a time on, and what was measured behind it of the outputs that are not missing in y
+  /// (n_y).
+  void retract(double time, const double* y) noexcept;
 
   /// How many of the newest nodes have to be taken back, at most `reach`, for what is stamped up to a time.
   int outdated(double until, int reach) const noexcept;
@@ -61,7 +67,7 @@ class RHEC_EXPORT NodeGrid {
   /// Of the newest node: its time, its outputs, and what was measured on the way to it.
   double time() const noexcept { return node(count_ - 1).time; }
   Measured outputs() const noexcept { return outputs_.measured(); }
-  MeasuredInterval interval() const noexcept { return between_.over(duration_, mean_.data()); }
+  MeasuredInterval interval() const noexcept { return between_.over(duration_, mean_.data(), ends_with_jump_); }
   /// Whether the newest node gives way to the next measurement.
   bool ends_open() const noexcept { return count_ > 0 && node(count_ - 1).kind == Kind::end; }
   /// Means over a time of inputs that hold from their stamps on, n_u; NaN if none is known.
@@ -85,8 +91,10 @@ class RHEC_EXPORT NodeGrid {
   }
   std::int64_t oldest() const noexcept;
   std::int64_t last_before(double time) const noexcept;
+  double last_node_up_to(double time) const noexcept;
   std::size_t group_end(std::size_t row) const noexcept;
   Node next_node(const Node& last, std::size_t from, std::size_t end) const noexcept;
+  bool has_jump(const Node& next, std::size_t end) const noexcept;
   void collect(const Node& next, std::size_t from, std::size_t end) noexcept;
 
   Setup setup_;
@@ -96,10 +104,12 @@ class RHEC_EXPORT NodeGrid {
   std::vector<Node> nodes_;  ///< the newest ones, in a ring
   std::int64_t count_ = 0;
   double start_ = 0.0;
-  double changed_, changed_input_;  ///< stamps of the oldest rows that came behind nodes
+  double changed_, changed_input_;  ///< stamps of the oldest rows, or jumps, that came behind nodes
   double lost_;                     ///< up to there rows are missing that nodes have used
   std::int64_t dropped_ = 0;
+  std::vector<double> jumps_;  ///< their times, ascending
   double duration_ = 0.0;
+  bool ends_with_jump_ = false;
   BetweenNodes between_;
   MeasuredOutputs outputs_;
   std::vector<double> mean_, weight_;

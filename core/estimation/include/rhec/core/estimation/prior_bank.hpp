@@ -42,14 +42,13 @@ class RHEC_EXPORT PriorBank {
   /// The weight, above 0 and at most 1, by which the last update scaled an output's information, for the most probable
   /// member; 1 without a robust loss.
   double robust_weight(int output) const noexcept;
-  /// Time update by `duration` [s] with a measured input (n_u, NaN where missing: 0, with the standard deviation
-  /// `unknown_sigma`).
-  void predict(const double* measured_input, double duration) noexcept;
-  /// The same with measurements between the two nodes, each used at its own time. The noise of an input and of a
-  /// process is one value over the interval, as a window has it, so that the moments are those of a window.
+  /// Time update over an interval. An input that is missing is 0, with the standard deviation `unknown_sigma`.
+  /// Measurements between the two nodes are each used at its own time. The noise of an input and of a process is one
+  /// value over the interval, as a window has it, so that the moments are those of a window.
   /// `end_outputs` (n_y, NaN where missing, or null) are those of the interval's end, for `update` to use afterwards:
   /// the interval is linearised where its outputs of motion put it, as by KalmanFilter::predict.
   void predict(const MeasuredInterval& interval, Measured end_outputs = nullptr) noexcept;
+  void predict(const double* measured_input, double duration) noexcept { predict({duration, measured_input}); }
   /// Whether that depends on the outputs of the interval's end.
   bool looks_ahead() const noexcept { return !setup_.motion_outputs.empty(); }
 
@@ -85,8 +84,8 @@ class RHEC_EXPORT PriorBank {
   void saved_moments(const double* state, int member, Eigen::VectorXd& mean, Eigen::MatrixXd& covariance) noexcept;
   /// Adds the probabilities of the members in what `save` has written.
   void add_saved_weights(const double* state, double* sums) const noexcept;
-  /// Interval data of a parameter's process, as in ProcessModel: ramp, F, L, over an advance of this time and ground.
-  void write_process(int member, int parameter, double duration, double distance, double* data) noexcept;
+  /// Interval data of a parameter's process, as in ProcessModel: ramp, F, L.
+  void write_process(int member, int parameter, const ProcessInterval& way, double* data) noexcept;
 
   /// Logarithm of the last update's likelihood, but for a constant that is the same for all banks.
   double log_likelihood() const noexcept { return log_likelihood_; }
@@ -121,8 +120,7 @@ class RHEC_EXPORT PriorBank {
   struct Frame;  ///< what outputs are taken in by
   int view_outputs(const double* gradients, std::ptrdiff_t entries, const double* y) noexcept;
   double take_outputs(const Frame& frame, const double* y, const double* robust_weights) noexcept;
-  void begin_step(const double* measured_input, double duration) noexcept;
-  void take_step(double duration) noexcept;
+  void begin_step(const MeasuredInterval& interval) noexcept;
   void take_linearised_step() noexcept;
   void integrate_members(const double* mean, bool is_wide, double seconds, double share) noexcept;
   void observe_members(const double* states) noexcept;
@@ -145,7 +143,7 @@ class RHEC_EXPORT PriorBank {
   int plain_count() const noexcept { return 2 * n_ - nx_ + nu_; }  ///< of the wide vector, without the factors f
   int wide_count() const noexcept;
   void find_distance(const double* input, double duration) noexcept;
-  void advance_processes(double duration) noexcept;
+  void advance_processes(double duration, bool ends_with_jump) noexcept;
   void mix_members() noexcept;
   void find_loss_scales();
   void weigh_outputs(const Frame& frame, const double* y, int taken, const double* given) noexcept;

@@ -17,6 +17,13 @@ struct MapDeviation {
   double least = 0.0;      ///< standard deviation that the map has at least
 };
 
+/// An interval, as far as processes depend on it.
+struct ProcessInterval {
+  double duration = 0.0, distance = 0.0;  ///< [s, m]
+  bool ends_with_jump = false;            ///< as in MeasuredInterval
+  bool operator==(const ProcessInterval&) const = default;
+};
+
 /// What a PriorBank is made of.
 struct PriorBankSetup {
   std::vector<PriorCombination> members;

@@ -79,7 +79,7 @@ class RHEC_EXPORT PriorHorizonEstimation final : public WindowedEstimation {
   struct Advance {
     std::int64_t number = -1;  ///< of the node after it
     int law = -1;
-    double duration = 0.0, distance = 0.0;
+    ProcessInterval way = {};
     bool operator==(const Advance&) const = default;
   };
 

@@ -7,7 +7,7 @@
 
 #include "rhec/core/estimation/estimate.hpp"
 #include "rhec/core/estimation/health.hpp"
-#include "rhec/core/estimation/kalman_filter.hpp"
+#include "rhec/core/estimation/sensor_watch_setup.hpp"
 
 namespace rhec {
 
@@ -23,7 +23,8 @@ class WalkingFilter;
 /// different causes, and get all measurements:
 ///   - slip has jumped: the parameters are made anew, once. Where this explains a few samples in a row, the
 ///     measurements were right, and are given back as late ones. Slip that jumps within an interval is another one on
-///     the next: it may be made anew there, too, if the measurements go on in the direction in which they were off;
+///     the next: it may be made anew there, too, if the measurements go on in the direction in which they were off.
+///     Where it does not explain the next samples all this is taken back;
 ///   - what the sensor measures has moved for good: the states that it sees are made anew, once. Where this explains
 ///     more samples than a transient may last, the estimate follows. After a time in which the sensor had said nothing
 ///     it is rather the estimate that is off, and a few samples are enough;
@@ -36,25 +37,7 @@ class WalkingFilter;
 /// Allocates in its constructor only.
 class RHEC_EXPORT SensorWatch {
  public:
-  struct Setup {
-    KalmanFilter::Noise noise;
-    std::vector<double> walk;              ///< n_p, standard deviation per square root of a step
-    std::vector<double> parameter_sigmas;  ///< n_p, of slip of which nothing is known
-    bool has_ramps = false;                ///< as in FilterEstimation::Setup
-    double step = 0.2;                     ///< [s]
-    int substeps = 1;                      ///< of a step
-    double gate = 5.0;   ///< innovations less probable than this many standard deviations are rejected
-    int proof = 11;      ///< samples that a sensor must have moved for before the estimate follows
-    int slip_proof = 2;  ///< samples that a jump of slip must explain
-    int gap_proof = 3;   ///< like `proof`, of a sensor that had said nothing for some time
-    int calm = 5;        ///< samples without a finding after which health is ok again
-    /// The same of a sensor that the estimate has followed: one that comes back as a transient does is then still
-    /// doubted.
-    int calm_after_moving = 10;
-    bool offsets = true;         ///< whether sensors that are off by little for long are found and corrected
-    double lost_position = 3.0;  ///< standard deviation above which the vehicle is lost [m]
-    double lost_heading = 0.5;   ///< likewise [rad]
-  };
+  using Setup = SensorWatchSetup;
   /// Throws Error if sizes do not match.
   SensorWatch(std::shared_ptr<const Model> model, const Setup& setup);
   ~SensorWatch();
@@ -72,9 +55,10 @@ class RHEC_EXPORT SensorWatch {
 
   /// What an estimator has to do beyond using what is left of the outputs.
   struct Finding {
-    bool release = false;  ///< measurements that were held back are right: see `held`
+    bool release = false;  ///< slip has jumped (`jumps`), and measurements that were held back are right (`held`)
     /// The estimate has to go on from `mean` and `covariance`, which contain this measurement.
     bool rebase = false;
+    bool retract = false;  ///< slip had not jumped: see `retraction`
   };
   /// Judges outputs (n_y, NaN where missing; weights as in Measured) of a time [s]; those not to be used become NaN.
   Finding judge(double time, double* outputs, const double* weights = nullptr) noexcept;
@@ -87,6 +71,13 @@ class RHEC_EXPORT SensorWatch {
   /// Measurements that were rejected and turned out right, before the last one; after `judge` has said so.
   const std::vector<Held>& held() const noexcept { return held_; }
   int held_count() const noexcept { return held_count_; }
+  /// Times of samples behind which slip has jumped; after `judge` has said so.
+  std::span<const double> jumps() const noexcept;
+  struct Retraction {
+    double from;            ///< behind this time [s]
+    const double* outputs;  ///< those that are not missing here (n_y) were wrong
+  };
+  Retraction retraction() const noexcept;
   const Eigen::VectorXd& mean() const noexcept;
   const Eigen::MatrixXd& covariance() const noexcept;
 
@@ -154,6 +145,7 @@ class RHEC_EXPORT SensorWatch {
   Finding settle(double time, const double* outputs) noexcept;
   Finding accept(Hypothesis& hypothesis) noexcept;
   double consider_slip() noexcept;
+  bool retract_slip() noexcept;
   void consider_moved(double likelihood_of_new_slip) noexcept;
   void begin_edge(bool is_new) noexcept;
   bool goes_on() noexcept, may_follow() const noexcept, consider_slip_before() noexcept;
@@ -164,8 +156,7 @@ class RHEC_EXPORT SensorWatch {
   bool is_position_disputed() const noexcept, is_place_lost() const noexcept, is_placed_otherwise() const noexcept;
   bool is_within_bounds(const WalkingFilter&filter) const noexcept, is_probably_slip() const noexcept;
   void test_inputs(const double* outputs) noexcept;
-  void note_offsets() noexcept;
-  void note_corrected(bool has_jumped) noexcept;
+  void note_offsets() noexcept, note_corrected(bool has_jumped) noexcept;
   void remember(double time, const double* outputs) noexcept;
   void note_volume(const Estimate& estimate) noexcept;
   double limit(std::size_t sensor, Eigen::Index degrees) const noexcept;
@@ -191,9 +182,8 @@ class RHEC_EXPORT SensorWatch {
   std::vector<int> quiet_;                                          ///< by sensor, samples since the last finding
   std::vector<double> raw_, raw_weights_, input_, believed_input_;  ///< weights: none where all are 1
   std::vector<Held> held_;
-  int held_count_ = 0;
   std::vector<Innovation> innovations_;
-  int innovation_count_ = 0;
+  int held_count_ = 0, innovation_count_ = 0;
   Innovation scratch_;
 };
 

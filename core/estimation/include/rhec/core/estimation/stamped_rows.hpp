@@ -23,6 +23,7 @@ class RHEC_EXPORT StampedRows {
   const double* values(std::size_t i) const noexcept { return values_.data() + (first_ + i) * width_; }
   /// The first row behind a time; `size()` if there is none.
   std::size_t first_after(double time) const noexcept;
+  double* values(std::size_t i) noexcept { return values_.data() + (first_ + i) * width_; }
   void drop_front(std::size_t rows) noexcept;
   void clear() noexcept { first_ = count_ = 0; }
 
@@ -39,6 +40,8 @@ class RHEC_EXPORT MeasuredRows final : public StampedRows {
 
   std::size_t insert(double time, Measured measured) noexcept;
   Measured measured(std::size_t i) const noexcept { return {values(i), values(i) + outputs_}; }
+  /// Row i loses the outputs that are not missing in y (n_y).
+  void remove(std::size_t i, const double* y) noexcept;
 
  private:
   int outputs_;

@@ -33,6 +33,8 @@ struct MeasuredInterval {
   const double* times = nullptr;
   const double* outputs = nullptr;
   const double* weights = nullptr;  ///< of these outputs as in Measured, rows of n_y; null: all 1
+  /// The parameters jump at its end: what they were before says nothing of what they are behind it.
+  bool ends_with_jump = false;
 
   /// Measurement number k between the nodes, of n_y outputs.
   Measured measured(int k, std::ptrdiff_t output_count) const noexcept {
@@ -97,8 +99,8 @@ class RHEC_EXPORT BetweenNodes {
   }
   Measured measured(int i) const noexcept { return {outputs(i), weights(i)}; }
   /// Over an interval of this duration and these inputs.
-  MeasuredInterval over(double duration, const double* inputs) const noexcept {
-    return {duration, inputs, count_, times_.data(), outputs_.data(), weights(0)};
+  MeasuredInterval over(double duration, const double* inputs, bool ends_with_jump = false) const noexcept {
+    return {duration, inputs, count_, times_.data(), outputs_.data(), weights(0), ends_with_jump};
   }
 
  private:
