@@ -13,6 +13,9 @@ SHORT = ("speed=10", "path.laps=1", "path.radius=12", "path.legs=2", "path.leg_l
 # Nothing of the developer's shell may make a difference.
 CLEAN = {name: value for name, value in os.environ.items() if name != "RHEC_PLUGIN_PATH"}
 
+# How many times as long things may take as in an optimised program, as with sanitizers.
+PATIENCE = float(os.environ.get("RHEC_PATIENCE", 1))
+
 # apps/commands.hpp
 FINE, ERROR, USAGE, NOT_SOLVED = 0, 1, 2, 3
 
@@ -26,7 +29,7 @@ class Program:
         self.path = pathlib.Path(path).resolve()
 
     def __call__(self, *words, timeout=60, **options):
-        return subprocess.run([str(self.path), *map(str, words)], capture_output=True, text=True, timeout=timeout, env=CLEAN,
+        return subprocess.run([str(self.path), *map(str, words)], capture_output=True, text=True, timeout=PATIENCE * timeout, env=CLEAN,
                               **options)
 
 

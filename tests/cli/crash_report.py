@@ -42,7 +42,7 @@ class Test(cli.Findings):
         self.environment = {**CLEAN, "XDG_CACHE_HOME": str(work / "cache")}
 
     def run(self, *words, environment=None):
-        return subprocess.run([self.rhec.path, *map(str, words)], capture_output=True, text=True, timeout=120,
+        return subprocess.run([self.rhec.path, *map(str, words)], capture_output=True, text=True, timeout=120 * cli.PATIENCE,
                               env=environment or self.environment)
 
     def folder_of(self, *names):

@@ -140,7 +140,7 @@ class Test(cli.Findings):
             print("unreadable: not tested, since this user may read everything and cannot give that up")
             return
         result = subprocess.run([*command, self.rhec.path, "plugins", "--doctor", "toy", "--plugin-path", folder],
-                                capture_output=True, text=True, timeout=60, env=CLEAN)
+                                capture_output=True, text=True, timeout=60 * cli.PATIENCE, env=CLEAN)
         self.expect(result.returncode == NOT_SOLVED, "unreadable", f"{result.returncode}: {result.stderr}")
         self.expect("the file cannot be read: Permission denied" in result.stdout and "chmod" in result.stdout, "unreadable",
                     result.stdout)
@@ -151,7 +151,7 @@ class Test(cli.Findings):
         file.write_text("")
         path = ":".join(map(str, [other, gone, file, "relative", good]))
         words = [self.rhec.path, "plugins", "--doctor", "--plugin-path", good]
-        result = subprocess.run(words, capture_output=True, text=True, timeout=60, env={**CLEAN, "RHEC_PLUGIN_PATH": path})
+        result = subprocess.run(words, capture_output=True, text=True, timeout=60 * cli.PATIENCE, env={**CLEAN, "RHEC_PLUGIN_PATH": path})
         self.expect(result.returncode == NOT_SOLVED, "places", f"{result.returncode}: {result.stderr}")
         lines = result.stdout.splitlines()
         for line in (f"{good} (--plugin-path)", f"{other} (RHEC_PLUGIN_PATH)",

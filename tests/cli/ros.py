@@ -17,7 +17,7 @@ import tempfile
 import time
 
 import cli
-from cli import ERROR, FINE, NOT_SOLVED, USAGE, Findings, Program, assignments
+from cli import ERROR, FINE, NOT_SOLVED, PATIENCE, USAGE, Findings, Program, assignments
 
 BLOCK = re.compile(r"<!-- run: tests/cli/ros.py -->\n```sh\n(.*?)```\n", re.DOTALL)
 ROBOT = cli.ROOT / "examples" / "ros" / "field_robot.yaml"
@@ -51,7 +51,7 @@ class Domain:
 def end_of(process, seconds):
     """Its exit code and what it said; killed if it does not end."""
     try:
-        text, _ = process.communicate(timeout=seconds)
+        text, _ = process.communicate(timeout=PATIENCE * seconds)
     except subprocess.TimeoutExpired:
         process.kill()
         text, _ = process.communicate()
@@ -137,8 +137,8 @@ def two_nodes_do_not_steer_one_robot(rhec, findings):
 
 def who_does_not_steer(rhec, findings):
     with Domain() as domain:
-        robot = domain.start(rhec, "ros", ROBOT, "--simulate", "--seconds", 4, "--json")
-        node = domain.start(rhec, "ros", ROBOT, "--seconds", 4, "--json", *assignments("ros.command.steer=false"))
+        robot = domain.start(rhec, "ros", ROBOT, "--simulate", "--seconds", 4 * PATIENCE, "--json")
+        node = domain.start(rhec, "ros", ROBOT, "--seconds", 4 * PATIENCE, "--json", *assignments("ros.command.steer=false"))
         _, robot_text = end_of(robot, 30)
         node_code, node_text = end_of(node, 30)
     findings.expect(node_code == FINE and "estimates, does not steer" in node_text, "a node that only estimates", node_text)

@@ -135,7 +135,7 @@ class Test(cli.Findings):
                             f"{second.returncode}: {second.stderr}")
                 process.send_signal(number)
                 process.send_signal(number)  # as timeout does
-                printed, errors = process.communicate(timeout=30)
+                printed, errors = process.communicate(timeout=30 * cli.PATIENCE)
             self.expect(process.returncode == NOT_SOLVED and not errors, "stopped", f"{process.returncode}: {errors}")
             made = re.search(r"(\d+) runs made", printed)
             self.expect(made and len(self.rows(out)) == int(made[1]), "stopped", printed)
@@ -170,7 +170,7 @@ class Test(cli.Findings):
                     shown += part
             except OSError:  # the other side is closed
                 pass
-            process.wait(timeout=30)
+            process.wait(timeout=30 * cli.PATIENCE)
         os.close(master)
         return shown.decode(), process.returncode
 

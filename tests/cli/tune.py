@@ -13,7 +13,7 @@ import tempfile
 import time
 import xml.etree.ElementTree
 
-from cli import CLEAN, ERROR, FIGURE8, FINE, NOT_SOLVED, ROOT, SHORT, USAGE, Findings, Program, assignments
+from cli import CLEAN, ERROR, FIGURE8, FINE, NOT_SOLVED, PATIENCE, ROOT, SHORT, USAGE, Findings, Program, assignments
 
 sys.path.insert(0, str(ROOT / "scripts" / "measure"))
 from drives import TRUTH, drive  # noqa: E402
@@ -50,7 +50,7 @@ def check_log(rhec, folder, findings):
     process = subprocess.Popen(command, cwd=folder, env=CLEAN, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     time.sleep(1.0)
     process.send_signal(signal.SIGINT)
-    text, errors = process.communicate(timeout=60)
+    text, errors = process.communicate(timeout=60 * PATIENCE)
     findings.expect(process.returncode == NOT_SOLVED and "stopped: this is the best" in text, "Ctrl-C", text + errors)
     findings.expect((folder / "stopped" / "tuned.yaml").exists(), "Ctrl-C writes nothing")
 
