@@ -228,7 +228,7 @@ bool SensorWatch::consider_slip_before() noexcept {
 double SensorWatch::consider_slip() noexcept {
   const bool is_new = !slip_->is_active;
   const auto slip_beyond = [&] { return Memory::slip_beyond(slip_->filter, memory_->before_slip, setup_.noise); };
-  double new_likelihood = Memory::unknown;
+  double new_likelihood = memory_->slip_likelihood = Memory::unknown;
   if (is_new) {
     start(*slip_);
     held_count_ = 0;
@@ -249,6 +249,7 @@ double SensorWatch::consider_slip() noexcept {
     return new_likelihood;
   }
   copy_numbers(slip_->filter.mean(), memory_->before_slip);
+  if (memory_->places.count() > 0) memory_->slip_likelihood = likelihood(slip_->filter, true);
   confront(*slip_, raw_.data(), true);
   memory_->is_slip_possible = slip_->is_active && slip_beyond() < impossible;
   begin_edge(is_new);
@@ -257,14 +258,26 @@ double SensorWatch::consider_slip() noexcept {
 
 void SensorWatch::consider_moved(double likelihood_of_new_slip) noexcept {
   const bool is_new = !moved_->is_active;
-  if (is_new) start_moved();
+  if (is_new) {
+    note_jump();
+    start_moved();
+  }
   // As probable before the sample as that slip has jumped.
   if (slip_->is_active && !std::isnan(likelihood_of_new_slip))
-    slip_probability_ = 1.0 / (1.0 + std::exp(likelihood(moved_->filter, true) - likelihood_of_new_slip));
+    slip_probability_ = 1.0 / (1.0 + std::exp(likelihood(moved_->filter, true) - likelihood_of_new_slip) +
+                               (back_->is_active ? std::exp(back_->evidence) : 0.0));
   // Whether the other sensors agree better with a vehicle whose state is what the disputed one says.
   if (!is_new && !is_position_disputed())
     moved_->evidence += likelihood(moved_->filter, false) - likelihood(own_->filter, false);
   confront(*moved_, raw_.data(), true);
+}
+
+/// The estimate goes along with what is disputed.
+void SensorWatch::note_followed() noexcept {
+  for (std::uint32_t& each : findings_)
+    if (each & reason::rejected) each |= reason::moved;
+  for (std::size_t s = 0; s < sensors_.size(); ++s) states_[s].reasons |= findings_[s] & reason::moved;
+  for (Record& record : records_) record = {};
 }
 
 SensorWatch::Finding SensorWatch::settle(double time, const double* outputs) noexcept {
@@ -281,7 +294,9 @@ SensorWatch::Finding SensorWatch::settle(double time, const double* outputs) noe
     own_->filter.update(weighed(outputs));
     return accept(*own_);
   }
-  consider_moved(consider_slip());
+  const double likelihood_of_new_slip = consider_slip();
+  consider_return(time);
+  consider_moved(likelihood_of_new_slip);
   think_again();
   if (!is_blind_) {
     if (!blind_->is_active) start(*blind_);
@@ -292,7 +307,13 @@ SensorWatch::Finding SensorWatch::settle(double time, const double* outputs) noe
   const bool has_begun_with_it = disputed_samples_ - slip_->explained < fresh;
   // Slip that would have to leave its bounds for what a compass says explains nothing of it.
   const bool may_be_slip = is_position_disputed() || is_within_bounds(slip_->filter);
-  if (may_be_slip && slip_->explained >= (has_begun_with_it ? setup_.slip_proof : setup_.proof)) {
+  if (has_come_back()) {
+    note_followed();
+    memory_->was_return = true;
+    memory_->places.come_back(memory_->place);
+    return accept(*back_);
+  }
+  if (may_be_slip && !has_rather_come_back() && slip_->explained >= (has_begun_with_it ? setup_.slip_proof : setup_.proof)) {
     Finding finding = accept(*slip_);
     for (Record& record : records_) record = {};
     acquit(outputs);
@@ -307,10 +328,8 @@ SensorWatch::Finding SensorWatch::settle(double time, const double* outputs) noe
     if (findings_[s] & reason::rejected) after_gap = after_gap && records_[s].after_gap;
   if (moved_->explained >= (after_gap ? setup_.gap_proof : setup_.proof) &&
       (may_follow() || moved_->evidence > convincing)) {
-    for (std::uint32_t& each : findings_)
-      if (each & reason::rejected) each |= reason::moved;
-    for (std::size_t s = 0; s < sensors_.size(); ++s) states_[s].reasons |= findings_[s] & reason::moved;
-    for (Record& record : records_) record = {};
+    leave_place(time, after_gap);
+    note_followed();
     return accept(*moved_);
   }
   if (memory_->search && is_place_lost()) {
@@ -319,6 +338,7 @@ SensorWatch::Finding SensorWatch::settle(double time, const double* outputs) noe
     moved_->filter.update(weighed(raw_.data()));
     make_slip_anew(moved_->filter, setup_.parameter_sigmas);
     search_from(moved_->filter, *memory_->search);
+    memory_->places.clear();
     for (Record& record : records_) record = {};
     return accept(*moved_);
   }
@@ -406,6 +426,7 @@ void SensorWatch::think_again() noexcept {
   go_on_from(moved_->filter, trial);
   search_from(trial, search);
   moved_->explained = 1;
+  memory_->is_jump_known = false;
   memory_->in_vain = 0;
 }
 
@@ -423,7 +444,7 @@ void SensorWatch::end_dispute() noexcept {
   slip_probability_ = 0.0;
   disputed_samples_ = unplaced_samples_ = 0;
   if (memory_->second_thought) memory_->second_thought->cancel();
-  for (Hypothesis* each : {slip_.get(), edge_.get(), moved_.get(), blind_.get()}) {
+  for (Hypothesis* each : {slip_.get(), edge_.get(), moved_.get(), back_.get(), blind_.get()}) {
     each->is_active = each->is_informed = false;
     each->explained = each->refuted = 0;
   }

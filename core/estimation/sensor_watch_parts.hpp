@@ -14,6 +14,7 @@
 #include "heading_search.hpp"
 #include "numbers.hpp"
 #include "offset_watch.hpp"
+#include "past_places.hpp"
 #include "rhec/core/base/with_size.hpp"
 #include "rhec/core/estimation/sensor_watch.hpp"
 #include "stuck_values.hpp"
@@ -28,7 +29,8 @@ struct SensorWatch::Hypothesis {
   WalkingFilter filter;
   bool is_active = false;
   int explained = 0, refuted = 0;
-  double evidence = 0.0;     ///< log likelihood of what is not disputed, more than by the filter without the sensor
+  double evidence = 0.0;     ///< log likelihood of what is not disputed, more than by the filter without the sensor;
+                             ///< of one that has come back: of all, more than by slip that has jumped
   bool is_informed = false;  ///< it has explained much before it was refuted
 };
 
@@ -77,6 +79,12 @@ struct SensorWatch::Memory {
   /// By how much measurements ask for slip beyond its bounds: a cumulative sum of standard deviations (Page 1954).
   double beyond_bounds = 0.0;
   int impossible_samples = 0;  ///< in a row in which that sum was too large
+  PastPlaces places;
+  std::size_t place = 0;  ///< that the position has come back to, while that is open
+  Displacement jump;      ///< of a position that has moved, from where the estimate expected it
+  bool is_jump_known = false;
+  bool was_return = false;           ///< what was followed last
+  double slip_likelihood = unknown;  ///< log likelihood of this sample by slip that has jumped
 
   /// After an update of a filter from a mean: how far slip would be beyond its bounds, in its standard deviations.
   static double slip_beyond(const WalkingFilter& filter, const Eigen::VectorXd& before,

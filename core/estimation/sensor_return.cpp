@@ -1,0 +1,139 @@
+#include <cmath>
+#include <limits>
+
+#include "innovation.hpp"
+#include "sensor_watch_parts.hpp"
+
+// A position that has moved, was followed, and comes back.
+
+namespace rhec {
+
+namespace {
+
+// Samples in a row that a return must explain: two alone are a transient.
+constexpr int return_proof = 3;
+// The logarithm of the odds, against another displacement, at which a return is considered: 20.
+constexpr double considerable = 3.0;
+// A sensor that has moved and explained so many samples in a row is what the next jump starts from.
+constexpr int settled = 4;
+
+}  // namespace
+
+/// The one disputed sensor that sees the position; -1 if there are none or several.
+int SensorWatch::disputed_position() const noexcept {
+  int found = -1;
+  for (std::size_t s = 0; s < sensors_.size(); ++s) {
+    if (!(findings_[s] & reason::rejected) || !sees_position(sensors_[s].outputs)) continue;
+    if (found >= 0) return -1;
+    found = static_cast<int>(s);
+  }
+  return found;
+}
+
+/// Before what has moved is made anew: by how much it has, from where the estimate expects it or, if it has jumped
+/// again, from where it was.
+void SensorWatch::note_jump() noexcept {
+  Memory& memory = *memory_;
+  const bool goes_on = moved_->is_informed && memory.is_jump_known;
+  memory.is_jump_known = false;
+  const int sensor = disputed_position();
+  WalkingFilter& from = goes_on ? moved_->filter : own_->filter;
+  const Roles& roles = from.model().description().roles;
+  if (sensor < 0 || roles.position_x < 0 || roles.position_y < 0) return;
+  const Sensor& about = sensors_[static_cast<std::size_t>(sensor)];
+  from.expect();
+  if (!from.innovation(about, weighed(raw_.data()), scratch_)) return;
+  PositionDerivatives derivatives(scratch_.value.size(), 2);
+  Eigen::Index row = 0;
+  for (const int j : about.outputs) {
+    if (std::isnan(raw_[static_cast<std::size_t>(j)])) continue;
+    derivatives(row, 0) = from.derivative(j, roles.position_x);
+    derivatives(row, 1) = from.derivative(j, roles.position_y);
+    ++row;
+  }
+  Displacement step;
+  memory.is_jump_known = displacement_of(scratch_.value, scratch_.covariance, derivatives, step);
+  if (!goes_on) memory.jump = {};
+  memory.jump.mean += step.mean;
+  memory.jump.covariance += step.covariance;
+}
+
+/// The estimate follows a position that has moved: where it was before is remembered.
+void SensorWatch::leave_place(double time, bool after_gap) noexcept {
+  if (!is_position_disputed()) return;
+  const int sensor = disputed_position();
+  memory_->was_return = false;
+  if (memory_->is_jump_known && sensor >= 0 && !after_gap)
+    memory_->places.leave(sensor, memory_->jump, time);
+  else
+    memory_->places.clear();
+}
+
+/// Whether it has come back to where it was before, which is a displacement that is known. Tried at every disputed
+/// sample, from where the estimate expects the position; or, if it had moved and jumps again, from there.
+void SensorWatch::consider_return(double time) noexcept {
+  Memory& memory = *memory_;
+  Hypothesis& back = *back_;
+  const auto note_likelihood = [&] {
+    if (slip_->is_active && !std::isnan(memory.slip_likelihood))
+      back.evidence += likelihood(back.filter, true) - memory.slip_likelihood;
+  };
+  if (back.is_active) {
+    note_likelihood();
+    confront(back, raw_.data(), true);
+    return;
+  }
+  memory.places.forget_before(time);
+  const int sensor = disputed_position();
+  if (memory.places.count() == 0 || sensor != memory.places.sensor()) return;
+  const bool is_followed = moved_->is_active ? moved_->explained >= settled : moved_->is_informed;
+  const bool has_moved = is_followed && memory.is_jump_known;
+  if (has_moved && fits(moved_->filter, raw_.data())) return;
+  WalkingFilter& from = has_moved ? moved_->filter : own_->filter;
+  const Sensor& about = sensors_[static_cast<std::size_t>(sensor)];
+  from.expect();
+  if (!from.innovation(about, weighed(raw_.data()), scratch_)) return;
+  const Innovation::OfSensor<1> jump = scratch_.value;
+  const Roles& roles = from.model().description().roles;
+  const int position[] = {roles.position_x, roles.position_y};
+  double best = considerable;
+  WalkingFilter& trial = *memory.trial;
+  for (std::size_t place = 0; place < memory.places.count(); ++place) {
+    Displacement shift = memory.places.to(place);
+    if (has_moved) {
+      shift.mean -= memory.jump.mean;
+      shift.covariance += memory.jump.covariance;
+    }
+    trial.mean() = from.mean();
+    trial.covariance() = from.covariance();
+    for (Eigen::Index c = 0; c < 2; ++c) {
+      trial.mean()[position[c]] += shift.mean[c];
+      for (Eigen::Index r = 0; r < 2; ++r) trial.covariance()(position[r], position[c]) += shift.covariance(r, c);
+    }
+    if (!fits(trial, raw_.data())) continue;
+    trial.innovation(about, weighed(raw_.data()), scratch_);
+    const double odds = log_odds_of_return(scratch_.value, scratch_.covariance, jump);
+    if (!(odds > best)) continue;
+    best = odds;
+    memory.place = place;
+    back.is_active = true;
+    back.filter.mean() = trial.mean();
+    back.filter.covariance() = trial.covariance();
+  }
+  if (!back.is_active) return;
+  back.explained = 0;
+  back.evidence = slip_->is_active ? 0.0 : std::numeric_limits<double>::infinity();
+  note_likelihood();
+  confront(back, raw_.data(), true);
+}
+
+/// Whether it is more probable that the position has come back than that slip has jumped.
+bool SensorWatch::has_rather_come_back() const noexcept {
+  return back_->is_active && (!slip_->is_active || back_->evidence > 0.0);
+}
+
+bool SensorWatch::has_come_back() const noexcept {
+  return has_rather_come_back() && back_->explained >= return_proof && !is_placed_otherwise();
+}
+
+}  // namespace rhec
