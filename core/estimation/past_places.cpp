@@ -31,8 +31,7 @@ bool displacement_of(const Innovation::OfSensor<1>& value, const Innovation::OfS
   return result.mean.allFinite() && result.covariance.allFinite();
 }
 
-double log_odds_of_return(const Innovation::OfSensor<1>& value,
-                          const Innovation::OfSensor<Eigen::Dynamic>& covariance,
+double log_odds_of_return(const Innovation::OfSensor<1>& value, const Innovation::OfSensor<Eigen::Dynamic>& covariance,
                           const Innovation::OfSensor<1>& jump) noexcept {
   const auto n = static_cast<double>(jump.size());
   const double moved = n * (1.0 + std::log(jump.squaredNorm() / n));

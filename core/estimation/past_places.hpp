@@ -27,8 +27,7 @@ bool displacement_of(const Innovation::OfSensor<1>& value, const Innovation::OfS
 /// How much more probable an innovation is if its mean is zero, with its covariance, than if something has moved by an
 /// unknown distance: a logarithm. `jump`: what it would be if nothing had moved. The unknown displacement has the
 /// isotropic variance that suits `jump` best, |jump|^2 / n.
-double log_odds_of_return(const Innovation::OfSensor<1>& value,
-                          const Innovation::OfSensor<Eigen::Dynamic>& covariance,
+double log_odds_of_return(const Innovation::OfSensor<1>& value, const Innovation::OfSensor<Eigen::Dynamic>& covariance,
                           const Innovation::OfSensor<1>& jump) noexcept;
 
 /// Where a sensor's position was before it moved, and was followed: a path of steps, of which the last ones are

@@ -23,16 +23,12 @@ constexpr double left_unexplained = 0.5;
 constexpr double convincing = 4.6;
 // Samples of a dispute within which slip may have jumped.
 constexpr int fresh = 2;
-// Slip that would be beyond its bounds by so many standard deviations has not jumped.
-constexpr double impossible = 3.0;
 // With more than this probability what is disputed is slip that has jumped.
 constexpr double probable = 0.9;
 // Slip that has jumped within an interval displaces the vehicle by at least this share of it on the next one again.
 constexpr double goes_on_by = 0.8;
 // Slip that has changed within the gates has done so by this many samples ago.
 constexpr int changed_before[] = {3, 6};
-// A hypothesis that has explained so many samples in a row has learnt how the vehicle moves.
-constexpr int informed = 4;
 // A search that has not explained anything for so long begins anew.
 constexpr int stale = 3;
 
@@ -65,9 +61,7 @@ void SensorWatch::start(Hypothesis& hypothesis) noexcept {
 /// which has gone on without.
 void SensorWatch::start_moved() noexcept {
   WalkingFilter& filter = moved_->filter;
-  moved_->is_active = true;
-  moved_->explained = 0;
-  moved_->evidence = 0.0;
+  moved_->begin();
   const ModelDescription& about = filter.model().description();
   if (!moved_->is_informed) go_on_from(own_->filter, filter);
   const auto is_position = [&](int i) { return i == about.roles.position_x || i == about.roles.position_y; };
@@ -96,7 +90,7 @@ bool SensorWatch::fits(WalkingFilter& filter, const double* outputs) noexcept {
 }
 
 void SensorWatch::refute(Hypothesis& hypothesis) noexcept {
-  hypothesis.is_informed = hypothesis.explained >= informed;
+  hypothesis.is_informed = hypothesis.explained >= Memory::informed;
   hypothesis.is_active = false;
   hypothesis.explained = 0;
   ++hypothesis.refuted;
@@ -149,11 +143,13 @@ double SensorWatch::likelihood(WalkingFilter& filter, bool with_rejected) noexce
 }
 
 void SensorWatch::confront(Hypothesis& hypothesis, const double* outputs, bool counts) noexcept {
-  if (!fits(hypothesis.filter, outputs)) {
+  const bool may_change_slip = counts && (&hypothesis == moved_.get() || &hypothesis == back_.get());
+  if (fits(hypothesis.filter, outputs)) {
+    hypothesis.filter.update_as_expected(weighed(outputs));
+  } else if (!may_change_slip || !changes_slip(hypothesis)) {
     refute(hypothesis);
     return;
   }
-  hypothesis.filter.update_as_expected(weighed(outputs));
   hypothesis.explained += counts;
 }
 
@@ -244,14 +240,14 @@ double SensorWatch::consider_slip() noexcept {
     go_on_from(edge_->filter, slip_->filter);
     copy_numbers(slip_->filter.mean(), memory_->before_slip);
     slip_->filter.update(weighed(raw_.data()));
-    memory_->is_slip_possible = slip_beyond() < impossible;
+    memory_->is_slip_possible = slip_beyond() < Memory::impossible_slip;
     edge_->is_active = false;
     return new_likelihood;
   }
   copy_numbers(slip_->filter.mean(), memory_->before_slip);
   if (memory_->places.count() > 0) memory_->slip_likelihood = likelihood(slip_->filter, true);
   confront(*slip_, raw_.data(), true);
-  memory_->is_slip_possible = slip_->is_active && slip_beyond() < impossible;
+  memory_->is_slip_possible = slip_->is_active && slip_beyond() < Memory::impossible_slip;
   begin_edge(is_new);
   return new_likelihood;
 }
@@ -313,7 +309,8 @@ SensorWatch::Finding SensorWatch::settle(double time, const double* outputs) noe
     memory_->places.come_back(memory_->place);
     return accept(*back_);
   }
-  if (may_be_slip && !has_rather_come_back() && slip_->explained >= (has_begun_with_it ? setup_.slip_proof : setup_.proof)) {
+  if (may_be_slip && !has_rather_come_back() &&
+      slip_->explained >= (has_begun_with_it ? setup_.slip_proof : setup_.proof)) {
     Finding finding = accept(*slip_);
     for (Record& record : records_) record = {};
     acquit(outputs);
@@ -326,7 +323,8 @@ SensorWatch::Finding SensorWatch::settle(double time, const double* outputs) noe
   bool after_gap = true;
   for (std::size_t s = 0; s < sensors_.size(); ++s)
     if (findings_[s] & reason::rejected) after_gap = after_gap && records_[s].after_gap;
-  if (moved_->explained >= (after_gap ? setup_.gap_proof : setup_.proof) &&
+  const bool is_slip_settled = moved_->new_slips == 0 || moved_->explained - moved_->new_slip_since > setup_.slip_proof;
+  if (is_slip_settled && moved_->explained >= (after_gap ? setup_.gap_proof : setup_.proof) &&
       (may_follow() || moved_->evidence > convincing)) {
     leave_place(time, after_gap);
     note_followed();
@@ -407,15 +405,15 @@ SensorWatch::Finding SensorWatch::accept(Hypothesis& hypothesis) noexcept {
 /// Where a sensor that has moved does not explain what follows, the heading may be wrong, too, e.g. after a turn
 /// without a position. One that is found goes on as if the sensor had moved.
 void SensorWatch::think_again() noexcept {
-  if (!memory_->second_thought || moved_->refuted == 0 || moved_->explained >= informed) return;
+  if (!memory_->second_thought || moved_->refuted == 0 || moved_->explained >= Memory::informed) return;
   HeadingSearch& search = *memory_->second_thought;
   if (search.is_active()) {
     const bool is_found = search.update(sensors_, weighed(raw_.data()));
     memory_->in_vain = search.explained() > 0 ? 0 : memory_->in_vain + 1;
     if (!is_found && memory_->in_vain < stale) return;
     if (is_found) {
-      moved_->is_active = true;
-      moved_->explained = search.explained();
+      moved_->begin();
+      moved_->explained = moved_->new_slip_since = search.explained();
       go_on_from(search.best(), moved_->filter);
       return;
     }

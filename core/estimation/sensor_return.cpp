@@ -12,10 +12,11 @@ namespace {
 
 // Samples in a row that a return must explain: two alone are a transient.
 constexpr int return_proof = 3;
+// Samples that a position that has moved must explain before slip may jump, too; one that has come back has proved more
+// with its first.
+constexpr int before_new_slip = 2;
 // The logarithm of the odds, against another displacement, at which a return is considered: 20.
 constexpr double considerable = 3.0;
-// A sensor that has moved and explained so many samples in a row is what the next jump starts from.
-constexpr int settled = 4;
 
 }  // namespace
 
@@ -86,7 +87,7 @@ void SensorWatch::consider_return(double time) noexcept {
   memory.places.forget_before(time);
   const int sensor = disputed_position();
   if (memory.places.count() == 0 || sensor != memory.places.sensor()) return;
-  const bool is_followed = moved_->is_active ? moved_->explained >= settled : moved_->is_informed;
+  const bool is_followed = moved_->is_active ? moved_->explained >= Memory::informed : moved_->is_informed;
   const bool has_moved = is_followed && memory.is_jump_known;
   if (has_moved && fits(moved_->filter, raw_.data())) return;
   WalkingFilter& from = has_moved ? moved_->filter : own_->filter;
@@ -116,15 +117,39 @@ void SensorWatch::consider_return(double time) noexcept {
     if (!(odds > best)) continue;
     best = odds;
     memory.place = place;
-    back.is_active = true;
     back.filter.mean() = trial.mean();
     back.filter.covariance() = trial.covariance();
+    back.begin();
   }
   if (!back.is_active) return;
-  back.explained = 0;
   back.evidence = slip_->is_active ? 0.0 : std::numeric_limits<double>::infinity();
   note_likelihood();
   confront(back, raw_.data(), true);
+}
+
+/// Slip may jump while a sensor has moved: whether slip that is made anew on the last interval explains what the
+/// hypothesis does not, within its bounds. Once it has explained some samples; and on the next interval once more, as
+/// of slip that has jumped within one.
+bool SensorWatch::changes_slip(Hypothesis& each) noexcept {
+  const int since = each.explained - each.new_slip_since;
+  const int enough = &each == back_.get() && each.new_slips == 0 ? 1 : before_new_slip;
+  const bool goes_on = each.new_slips == 1 && since == 1;
+  if (since < enough && !goes_on) return false;
+  WalkingFilter& trial = *memory_->trial;
+  trial.mean() = each.before_mean;
+  trial.covariance() = each.before_covariance;
+  for (std::size_t j = 0; j < setup_.parameter_sigmas.size(); ++j)
+    trial.restart_parameter(static_cast<int>(j), setup_.parameter_sigmas[j]);
+  trial.predict(input_.data(), memory_->duration);
+  if (!fits(trial, raw_.data())) return false;
+  copy_numbers(trial.mean(), memory_->before_slip);
+  trial.update_as_expected(weighed(raw_.data()));
+  if (Memory::slip_beyond(trial, memory_->before_slip, setup_.noise) >= Memory::impossible_slip) return false;
+  each.filter.mean() = trial.mean();
+  each.filter.covariance() = trial.covariance();
+  each.new_slips = goes_on ? 2 : 1;
+  each.new_slip_since = each.explained;
+  return true;
 }
 
 /// Whether it is more probable that the position has come back than that slip has jumped.
@@ -133,7 +158,8 @@ bool SensorWatch::has_rather_come_back() const noexcept {
 }
 
 bool SensorWatch::has_come_back() const noexcept {
-  return has_rather_come_back() && back_->explained >= return_proof && !is_placed_otherwise();
+  const bool is_slip_settled = back_->new_slips == 0 || back_->explained - back_->new_slip_since >= setup_.slip_proof;
+  return has_rather_come_back() && is_slip_settled && back_->explained >= return_proof && !is_placed_otherwise();
 }
 
 }  // namespace rhec

@@ -103,7 +103,10 @@ SensorWatch::SensorWatch(std::shared_ptr<const Model> model, const Setup& setup)
     close_limits_.push_back(degrees ? chi_square_limit(degrees, std::min(setup_.gate, close_gate)) : 0.0);
   }
   const auto make = [&](const WalkingFilter::Setup& filter) {
-    return std::make_unique<Hypothesis>(Hypothesis{WalkingFilter(model, filter)});
+    auto result = std::make_unique<Hypothesis>(Hypothesis{WalkingFilter(model, filter)});
+    result->before_mean = result->filter.mean();
+    result->before_covariance = result->filter.covariance();
+    return result;
   };
   own_ = make(filter_setup(setup_));
   slip_ = make(filter_setup(setup_));
@@ -224,6 +227,8 @@ void SensorWatch::advance(double duration, const double* inputs, const double* m
     memory_->search->predict(inputs, duration);
     return;
   }
+  for (Hypothesis* each : {moved_.get(), back_.get()})
+    if (each->is_active && !memory_->has_advanced) each->note_before();
   note_motion(duration, inputs);
   if (memory_->count > 0) std::copy(input_.begin(), input_.end(), memory_->entries[memory_->newest].inputs.begin());
   if (is_blind_) {

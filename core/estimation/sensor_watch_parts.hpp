@@ -32,6 +32,22 @@ struct SensorWatch::Hypothesis {
   double evidence = 0.0;     ///< log likelihood of what is not disputed, more than by the filter without the sensor;
                              ///< of one that has come back: of all, more than by slip that has jumped
   bool is_informed = false;  ///< it has explained much before it was refuted
+  // Of a sensor that has moved, while slip jumps as well: what was known after the last samples, how many had been
+  // explained when slip was made anew, and how often in a row that was.
+  Eigen::VectorXd before_mean = {};
+  Eigen::MatrixXd before_covariance = {};
+  int new_slip_since = 0, new_slips = 0;
+
+  void begin() noexcept {
+    is_active = true;
+    explained = new_slip_since = new_slips = 0;
+    evidence = 0.0;
+    note_before();
+  }
+  void note_before() noexcept {
+    copy_numbers(filter.mean(), before_mean);
+    copy_numbers(filter.covariance(), before_covariance);
+  }
 };
 
 /// What was known after the last samples, and the motion since then.
@@ -42,6 +58,10 @@ struct SensorWatch::Memory {
   static constexpr double known_heading = 0.35;
   // Disputes longer than this many times the proof mean that nothing explains the sensors.
   static constexpr int hopeless = 3;
+  // A hypothesis that has explained so many samples in a row has learnt how the vehicle moves.
+  static constexpr int informed = 4;
+  // Slip that would be beyond its bounds by so many standard deviations has not jumped.
+  static constexpr double impossible_slip = 3.0;
 
   struct Entry {
     double time = unknown;

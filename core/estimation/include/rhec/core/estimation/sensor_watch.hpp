@@ -43,11 +43,11 @@ class RHEC_EXPORT SensorWatch {
     bool has_ramps = false;                ///< as in FilterEstimation::Setup
     double step = 0.2;                     ///< [s]
     int substeps = 1;                      ///< of a step
-    double gate = 5.0;   ///< innovations less probable than this many standard deviations are rejected
-    int proof = 11;      ///< samples that a sensor must have moved for before the estimate follows
-    int slip_proof = 2;  ///< samples that a jump of slip must explain
-    int gap_proof = 3;   ///< like `proof`, of a sensor that had said nothing for some time
-    int calm = 5;        ///< samples without a finding after which health is ok again
+    double gate = 5.0;           ///< innovations less probable than this many standard deviations are rejected
+    int proof = 11;              ///< samples that a sensor must have moved for before the estimate follows
+    int slip_proof = 2;          ///< samples that a jump of slip must explain
+    int gap_proof = 3;           ///< like `proof`, of a sensor that had said nothing for some time
+    int calm = 5;                ///< samples without a finding after which health is ok again
     int calm_after_moving = 10;  ///< the same of a sensor that was followed: a transient that ends is still doubted
     bool offsets = true;         ///< whether sensors that are off by little for long are found and corrected
     double lost_position = 3.0;  ///< standard deviation above which the vehicle is lost [m]
@@ -155,12 +155,12 @@ class RHEC_EXPORT SensorWatch {
   void consider_moved(double likelihood_of_new_slip) noexcept;
   void consider_return(double time) noexcept, leave_place(double time, bool after_gap) noexcept;
   void note_jump() noexcept, note_followed() noexcept, begin_edge(bool is_new) noexcept;
-  bool has_come_back() const noexcept, has_rather_come_back() const noexcept;
+  bool has_come_back() const noexcept, has_rather_come_back() const noexcept, changes_slip(Hypothesis&each) noexcept;
   bool goes_on() noexcept, may_follow() const noexcept, consider_slip_before() noexcept;
   int disputed_position() const noexcept;
   void hold_back(double time, const double* outputs) noexcept;
   void acquit(const double*outputs) noexcept, end_dispute() noexcept;
-  bool sees_position(int output) const noexcept, sees_position(const std::vector<int>& outputs) const noexcept;
+  bool sees_position(int output) const noexcept, sees_position(const std::vector<int>&outputs) const noexcept;
   bool is_position_disputed() const noexcept, is_place_lost() const noexcept, is_placed_otherwise() const noexcept;
   bool is_within_bounds(const WalkingFilter&filter) const noexcept, is_probably_slip() const noexcept;
   void test_inputs(const double* outputs) noexcept;
