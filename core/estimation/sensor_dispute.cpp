@@ -143,7 +143,8 @@ double SensorWatch::likelihood(WalkingFilter& filter, bool with_rejected) noexce
 }
 
 void SensorWatch::confront(Hypothesis& hypothesis, const double* outputs, bool counts) noexcept {
-  const bool may_change_slip = counts && (&hypothesis == moved_.get() || &hypothesis == back_.get());
+  const bool has_moved = &hypothesis == moved_.get() || &hypothesis == back_.get();
+  const bool may_change_slip = counts && has_moved && is_position_disputed();
   if (fits(hypothesis.filter, outputs)) {
     hypothesis.filter.update_as_expected(weighed(outputs));
   } else if (!may_change_slip || !changes_slip(hypothesis)) {
@@ -224,7 +225,7 @@ bool SensorWatch::consider_slip_before() noexcept {
 double SensorWatch::consider_slip() noexcept {
   const bool is_new = !slip_->is_active;
   const auto slip_beyond = [&] { return Memory::slip_beyond(slip_->filter, memory_->before_slip, setup_.noise); };
-  double new_likelihood = memory_->slip_likelihood = Memory::unknown;
+  double new_likelihood = Memory::unknown;
   if (is_new) {
     start(*slip_);
     held_count_ = 0;
@@ -245,7 +246,6 @@ double SensorWatch::consider_slip() noexcept {
     return new_likelihood;
   }
   copy_numbers(slip_->filter.mean(), memory_->before_slip);
-  if (memory_->places.count() > 0) memory_->slip_likelihood = likelihood(slip_->filter, true);
   confront(*slip_, raw_.data(), true);
   memory_->is_slip_possible = slip_->is_active && slip_beyond() < Memory::impossible_slip;
   begin_edge(is_new);
@@ -260,8 +260,7 @@ void SensorWatch::consider_moved(double likelihood_of_new_slip) noexcept {
   }
   // As probable before the sample as that slip has jumped.
   if (slip_->is_active && !std::isnan(likelihood_of_new_slip))
-    slip_probability_ = 1.0 / (1.0 + std::exp(likelihood(moved_->filter, true) - likelihood_of_new_slip) +
-                               (back_->is_active ? std::exp(back_->evidence) : 0.0));
+    slip_probability_ = 1.0 / (1.0 + std::exp(likelihood(moved_->filter, true) - likelihood_of_new_slip));
   // Whether the other sensors agree better with a vehicle whose state is what the disputed one says.
   if (!is_new && !is_position_disputed())
     moved_->evidence += likelihood(moved_->filter, false) - likelihood(own_->filter, false);
@@ -309,8 +308,7 @@ SensorWatch::Finding SensorWatch::settle(double time, const double* outputs) noe
     memory_->places.come_back(memory_->place);
     return accept(*back_);
   }
-  if (may_be_slip && !has_rather_come_back() &&
-      slip_->explained >= (has_begun_with_it ? setup_.slip_proof : setup_.proof)) {
+  if (may_be_slip && slip_->explained >= (has_begun_with_it ? setup_.slip_proof : setup_.proof)) {
     Finding finding = accept(*slip_);
     for (Record& record : records_) record = {};
     acquit(outputs);

@@ -1,5 +1,4 @@
 #include <cmath>
-#include <limits>
 
 #include "innovation.hpp"
 #include "sensor_watch_parts.hpp"
@@ -61,9 +60,9 @@ void SensorWatch::note_jump() noexcept {
 
 /// The estimate follows a position that has moved: where it was before is remembered.
 void SensorWatch::leave_place(double time, bool after_gap) noexcept {
+  memory_->was_return = false;
   if (!is_position_disputed()) return;
   const int sensor = disputed_position();
-  memory_->was_return = false;
   if (memory_->is_jump_known && sensor >= 0 && !after_gap)
     memory_->places.leave(sensor, memory_->jump, time);
   else
@@ -75,12 +74,7 @@ void SensorWatch::leave_place(double time, bool after_gap) noexcept {
 void SensorWatch::consider_return(double time) noexcept {
   Memory& memory = *memory_;
   Hypothesis& back = *back_;
-  const auto note_likelihood = [&] {
-    if (slip_->is_active && !std::isnan(memory.slip_likelihood))
-      back.evidence += likelihood(back.filter, true) - memory.slip_likelihood;
-  };
   if (back.is_active) {
-    note_likelihood();
     confront(back, raw_.data(), true);
     return;
   }
@@ -121,10 +115,7 @@ void SensorWatch::consider_return(double time) noexcept {
     back.filter.covariance() = trial.covariance();
     back.begin();
   }
-  if (!back.is_active) return;
-  back.evidence = slip_->is_active ? 0.0 : std::numeric_limits<double>::infinity();
-  note_likelihood();
-  confront(back, raw_.data(), true);
+  if (back.is_active) confront(back, raw_.data(), true);
 }
 
 /// Slip may jump while a sensor has moved: whether slip that is made anew on the last interval explains what the
@@ -152,14 +143,9 @@ bool SensorWatch::changes_slip(Hypothesis& each) noexcept {
   return true;
 }
 
-/// Whether it is more probable that the position has come back than that slip has jumped.
-bool SensorWatch::has_rather_come_back() const noexcept {
-  return back_->is_active && (!slip_->is_active || back_->evidence > 0.0);
-}
-
 bool SensorWatch::has_come_back() const noexcept {
   const bool is_slip_settled = back_->new_slips == 0 || back_->explained - back_->new_slip_since >= setup_.slip_proof;
-  return has_rather_come_back() && is_slip_settled && back_->explained >= return_proof && !is_placed_otherwise();
+  return back_->is_active && is_slip_settled && back_->explained >= return_proof && !is_placed_otherwise();
 }
 
 }  // namespace rhec

@@ -29,8 +29,7 @@ struct SensorWatch::Hypothesis {
   WalkingFilter filter;
   bool is_active = false;
   int explained = 0, refuted = 0;
-  double evidence = 0.0;     ///< log likelihood of what is not disputed, more than by the filter without the sensor;
-                             ///< of one that has come back: of all, more than by slip that has jumped
+  double evidence = 0.0;     ///< log likelihood of what is not disputed, more than by the filter without the sensor
   bool is_informed = false;  ///< it has explained much before it was refuted
   // Of a sensor that has moved, while slip jumps as well: what was known after the last samples, how many had been
   // explained when slip was made anew, and how often in a row that was.
@@ -103,8 +102,7 @@ struct SensorWatch::Memory {
   std::size_t place = 0;  ///< that the position has come back to, while that is open
   Displacement jump;      ///< of a position that has moved, from where the estimate expected it
   bool is_jump_known = false;
-  bool was_return = false;           ///< what was followed last
-  double slip_likelihood = unknown;  ///< log likelihood of this sample by slip that has jumped
+  bool was_return = false;  ///< what was followed last
 
   /// After an update of a filter from a mean: how far slip would be beyond its bounds, in its standard deviations.
   static double slip_beyond(const WalkingFilter& filter, const Eigen::VectorXd& before,

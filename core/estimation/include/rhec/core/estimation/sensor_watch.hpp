@@ -155,7 +155,7 @@ class RHEC_EXPORT SensorWatch {
   void consider_moved(double likelihood_of_new_slip) noexcept;
   void consider_return(double time) noexcept, leave_place(double time, bool after_gap) noexcept;
   void note_jump() noexcept, note_followed() noexcept, begin_edge(bool is_new) noexcept;
-  bool has_come_back() const noexcept, has_rather_come_back() const noexcept, changes_slip(Hypothesis&each) noexcept;
+  bool has_come_back() const noexcept, changes_slip(Hypothesis&each) noexcept;
   bool goes_on() noexcept, may_follow() const noexcept, consider_slip_before() noexcept;
   int disputed_position() const noexcept;
   void hold_back(double time, const double* outputs) noexcept;
