@@ -302,12 +302,7 @@ SensorWatch::Finding SensorWatch::settle(double time, const double* outputs) noe
   const bool has_begun_with_it = disputed_samples_ - slip_->explained < fresh;
   // Slip that would have to leave its bounds for what a compass says explains nothing of it.
   const bool may_be_slip = is_position_disputed() || is_within_bounds(slip_->filter);
-  if (has_come_back()) {
-    note_followed();
-    memory_->was_return = true;
-    memory_->places.come_back(memory_->place);
-    return accept(*back_);
-  }
+  if (has_come_back()) return come_back();
   if (may_be_slip && slip_->explained >= (has_begun_with_it ? setup_.slip_proof : setup_.proof)) {
     Finding finding = accept(*slip_);
     for (Record& record : records_) record = {};

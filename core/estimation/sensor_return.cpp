@@ -70,7 +70,8 @@ void SensorWatch::leave_place(double time, bool after_gap) noexcept {
 }
 
 /// Whether it has come back to where it was before, which is a displacement that is known. Tried at every disputed
-/// sample, from where the estimate expects the position; or, if it had moved and jumps again, from there.
+/// sample, from where the estimate expects the position; or, if it had moved and jumps again, from there: it may then
+/// have come back to where it was when the dispute began, too.
 void SensorWatch::consider_return(double time) noexcept {
   Memory& memory = *memory_;
   Hypothesis& back = *back_;
@@ -80,10 +81,11 @@ void SensorWatch::consider_return(double time) noexcept {
   }
   memory.places.forget_before(time);
   const int sensor = disputed_position();
-  if (memory.places.count() == 0 || sensor != memory.places.sensor()) return;
+  if (sensor < 0) return;
   const bool is_followed = moved_->is_active ? moved_->explained >= Memory::informed : moved_->is_informed;
   const bool has_moved = is_followed && memory.is_jump_known;
-  if (has_moved && fits(moved_->filter, raw_.data())) return;
+  const std::size_t places = sensor == memory.places.sensor() ? memory.places.count() : 0;
+  if ((places == 0 && !has_moved) || (has_moved && fits(moved_->filter, raw_.data()))) return;
   WalkingFilter& from = has_moved ? moved_->filter : own_->filter;
   const Sensor& about = sensors_[static_cast<std::size_t>(sensor)];
   from.expect();
@@ -93,7 +95,8 @@ void SensorWatch::consider_return(double time) noexcept {
   const int position[] = {roles.position_x, roles.position_y};
   double best = considerable;
   WalkingFilter& trial = *memory.trial;
-  for (std::size_t place = 0; place < memory.places.count(); ++place) {
+  // The last one is where the estimate is, as after a transient.
+  for (std::size_t place = memory.places.count() - places; place < memory.places.count() + has_moved; ++place) {
     Displacement shift = memory.places.to(place);
     if (has_moved) {
       shift.mean -= memory.jump.mean;
@@ -141,6 +144,18 @@ bool SensorWatch::changes_slip(Hypothesis& each) noexcept {
   each.new_slips = goes_on ? 2 : 1;
   each.new_slip_since = each.explained;
   return true;
+}
+
+/// The estimate goes on with what has come back. It has moved only if the estimate had followed it.
+SensorWatch::Finding SensorWatch::come_back() noexcept {
+  Memory& memory = *memory_;
+  if (memory.place < memory.places.count()) {
+    note_followed();
+    memory.was_return = true;
+    memory.places.come_back(memory.place);
+  }
+  for (Record& record : records_) record = {};
+  return accept(*back_);
 }
 
 bool SensorWatch::has_come_back() const noexcept {

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <string>
 
 #include "support/sensor_faults.hpp"
 
@@ -96,6 +97,19 @@ TEST_P(SensorReturns, ASecondTransientIsNotFollowedEarlier) {
       EXPECT_LE(episode.samples_to_recover(usual_error), 5);
     });
   }
+}
+
+/// A transient leaves for a place that is known after some samples, and ends where it began: that is seen even if what
+/// is known without a position has become wrong meanwhile.
+TEST_P(SensorReturns, ATransientEndsWhereItBegan) {
+  const Fault fault{
+      .spoil = [](Delivery& d) { d.outputs[1] += 100.0; }, .length = 10, .moved = 0.0, .slip = 0.45, .slip_after = 5};
+  expect_each(fault, [](const Episode& episode) {
+    EXPECT_LE(episode.samples_to_recover(usual_error), 2);
+    EXPECT_LE(episode.samples_to_ok(), 8);
+    for (const auto* part : {&episode.during, &episode.after})
+      for (const Episode::Sample& sample : *part) EXPECT_EQ(sample.words.find("moved"), std::string::npos);
+  });
 }
 
 /// Slip that jumps while it is open whether a position has moved does not refute that.

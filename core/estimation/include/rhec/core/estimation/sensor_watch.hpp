@@ -150,7 +150,7 @@ class RHEC_EXPORT SensorWatch {
   double likelihood(WalkingFilter& filter, bool with_rejected) noexcept;
   void confront(Hypothesis& hypothesis, const double* outputs, bool counts) noexcept;
   Finding settle(double time, const double* outputs) noexcept;
-  Finding accept(Hypothesis& hypothesis) noexcept;
+  Finding accept(Hypothesis&hypothesis) noexcept, come_back() noexcept;
   double consider_slip() noexcept;
   void consider_moved(double likelihood_of_new_slip) noexcept;
   void consider_return(double time) noexcept, leave_place(double time, bool after_gap) noexcept;
