@@ -23,8 +23,6 @@ constexpr double left_unexplained = 0.5;
 constexpr double convincing = 4.6;
 // Samples of a dispute within which slip may have jumped.
 constexpr int fresh = 2;
-// Slip that would be beyond its bounds by so many standard deviations has not jumped.
-constexpr double impossible = 3.0;
 // With more than this probability what is disputed is slip that has jumped.
 constexpr double probable = 0.9;
 // Slip that has jumped within an interval displaces the vehicle by at least this share of it on the next one again.
@@ -33,8 +31,6 @@ constexpr double goes_on_by = 0.8;
 constexpr int soon = 2;
 // Slip that has changed within the gates has done so by this many samples ago.
 constexpr int changed_before[] = {3, 6};
-// A hypothesis that has explained so many samples in a row has learnt how the vehicle moves.
-constexpr int informed = 4;
 // A search that has not explained anything for so long begins anew.
 constexpr int stale = 3;
 
@@ -67,9 +63,7 @@ void SensorWatch::start(Hypothesis& hypothesis) noexcept {
 /// which has gone on without.
 void SensorWatch::start_moved() noexcept {
   WalkingFilter& filter = moved_->filter;
-  moved_->is_active = true;
-  moved_->explained = 0;
-  moved_->evidence = 0.0;
+  moved_->begin();
   const ModelDescription& about = filter.model().description();
   if (!moved_->is_informed) go_on_from(own_->filter, filter);
   const auto is_position = [&](int i) { return i == about.roles.position_x || i == about.roles.position_y; };
@@ -98,7 +92,7 @@ bool SensorWatch::fits(WalkingFilter& filter, const double* outputs) noexcept {
 }
 
 void SensorWatch::refute(Hypothesis& hypothesis) noexcept {
-  hypothesis.is_informed = hypothesis.explained >= informed;
+  hypothesis.is_informed = hypothesis.explained >= Memory::informed;
   hypothesis.is_active = false;
   hypothesis.explained = 0;
   ++hypothesis.refuted;
@@ -190,11 +184,14 @@ std::span<const double> SensorWatch::jumps() const noexcept {
 }
 
 void SensorWatch::confront(Hypothesis& hypothesis, const double* outputs, bool counts) noexcept {
-  if (!fits(hypothesis.filter, outputs)) {
+  const bool has_moved = &hypothesis == moved_.get() || &hypothesis == back_.get();
+  const bool may_change_slip = counts && has_moved && is_position_disputed();
+  if (fits(hypothesis.filter, outputs)) {
+    hypothesis.filter.update_as_expected(weighed(outputs));
+  } else if (!may_change_slip || !changes_slip(hypothesis)) {
     refute(hypothesis);
     return;
   }
-  hypothesis.filter.update_as_expected(weighed(outputs));
   hypothesis.explained += counts;
 }
 
@@ -284,7 +281,7 @@ double SensorWatch::consider_slip() noexcept {
     go_on_from(edge_->filter, slip_->filter);
     copy_numbers(slip_->filter.mean(), memory_->before_slip);
     slip_->filter.update(weighed(raw_.data()));
-    memory_->is_slip_possible = slip_beyond() < impossible;
+    memory_->is_slip_possible = slip_beyond() < Memory::impossible_slip;
     memory_->jumps[1] = memory_->entry(0).time;
     memory_->jump_count = 2;
     edge_->is_active = false;
@@ -292,14 +289,17 @@ double SensorWatch::consider_slip() noexcept {
   }
   copy_numbers(slip_->filter.mean(), memory_->before_slip);
   confront(*slip_, raw_.data(), true);
-  memory_->is_slip_possible = slip_->is_active && slip_beyond() < impossible;
+  memory_->is_slip_possible = slip_->is_active && slip_beyond() < Memory::impossible_slip;
   begin_edge(is_new);
   return new_likelihood;
 }
 
 void SensorWatch::consider_moved(double likelihood_of_new_slip) noexcept {
   const bool is_new = !moved_->is_active;
-  if (is_new) start_moved();
+  if (is_new) {
+    note_jump();
+    start_moved();
+  }
   // As probable before the sample as that slip has jumped.
   if (slip_->is_active && !std::isnan(likelihood_of_new_slip))
     slip_probability_ = 1.0 / (1.0 + std::exp(likelihood(moved_->filter, true) - likelihood_of_new_slip));
@@ -307,6 +307,14 @@ void SensorWatch::consider_moved(double likelihood_of_new_slip) noexcept {
   if (!is_new && !is_position_disputed())
     moved_->evidence += likelihood(moved_->filter, false) - likelihood(own_->filter, false);
   confront(*moved_, raw_.data(), true);
+}
+
+/// The estimate goes along with what is disputed.
+void SensorWatch::note_followed() noexcept {
+  for (std::uint32_t& each : findings_)
+    if (each & reason::rejected) each |= reason::moved;
+  for (std::size_t s = 0; s < sensors_.size(); ++s) states_[s].reasons |= findings_[s] & reason::moved;
+  for (Record& record : records_) record = {};
 }
 
 SensorWatch::Finding SensorWatch::settle(double time, const double* outputs) noexcept {
@@ -325,6 +333,7 @@ SensorWatch::Finding SensorWatch::settle(double time, const double* outputs) noe
   }
   const double likelihood_of_new_slip = consider_slip();
   const bool retracts = retract_slip();
+  consider_return(time);
   consider_moved(likelihood_of_new_slip);
   think_again();
   if (!is_blind_) {
@@ -336,6 +345,7 @@ SensorWatch::Finding SensorWatch::settle(double time, const double* outputs) noe
   const bool has_begun_with_it = disputed_samples_ - slip_->explained < fresh;
   // Slip that would have to leave its bounds for what a compass says explains nothing of it.
   const bool may_be_slip = is_position_disputed() || is_within_bounds(slip_->filter);
+  if (has_come_back()) return come_back();
   if (may_be_slip && slip_->explained >= (has_begun_with_it ? setup_.slip_proof : setup_.proof)) {
     // What has explained much, or follows a gap, is not doubted for what comes next.
     const bool is_doubtful = slip_->explained < setup_.proof &&
@@ -351,12 +361,11 @@ SensorWatch::Finding SensorWatch::settle(double time, const double* outputs) noe
   bool after_gap = true;
   for (std::size_t s = 0; s < sensors_.size(); ++s)
     if (findings_[s] & reason::rejected) after_gap = after_gap && records_[s].after_gap;
-  if (moved_->explained >= (after_gap ? setup_.gap_proof : setup_.proof) &&
+  const bool is_slip_settled = moved_->new_slips == 0 || moved_->explained - moved_->new_slip_since > setup_.slip_proof;
+  if (is_slip_settled && moved_->explained >= (after_gap ? setup_.gap_proof : setup_.proof) &&
       (may_follow() || moved_->evidence > convincing)) {
-    for (std::uint32_t& each : findings_)
-      if (each & reason::rejected) each |= reason::moved;
-    for (std::size_t s = 0; s < sensors_.size(); ++s) states_[s].reasons |= findings_[s] & reason::moved;
-    for (Record& record : records_) record = {};
+    leave_place(time, after_gap);
+    note_followed();
     return accept(*moved_);
   }
   if (memory_->search && is_place_lost()) {
@@ -365,6 +374,7 @@ SensorWatch::Finding SensorWatch::settle(double time, const double* outputs) noe
     moved_->filter.update(weighed(raw_.data()));
     make_slip_anew(moved_->filter, setup_.parameter_sigmas);
     search_from(moved_->filter, *memory_->search);
+    memory_->places.clear();
     for (Record& record : records_) record = {};
     return accept(*moved_);
   }
@@ -433,15 +443,15 @@ SensorWatch::Finding SensorWatch::accept(Hypothesis& hypothesis) noexcept {
 /// Where a sensor that has moved does not explain what follows, the heading may be wrong, too, e.g. after a turn
 /// without a position. One that is found goes on as if the sensor had moved.
 void SensorWatch::think_again() noexcept {
-  if (!memory_->second_thought || moved_->refuted == 0 || moved_->explained >= informed) return;
+  if (!memory_->second_thought || moved_->refuted == 0 || moved_->explained >= Memory::informed) return;
   HeadingSearch& search = *memory_->second_thought;
   if (search.is_active()) {
     const bool is_found = search.update(sensors_, weighed(raw_.data()));
     memory_->in_vain = search.explained() > 0 ? 0 : memory_->in_vain + 1;
     if (!is_found && memory_->in_vain < stale) return;
     if (is_found) {
-      moved_->is_active = true;
-      moved_->explained = search.explained();
+      moved_->begin();
+      moved_->explained = moved_->new_slip_since = search.explained();
       go_on_from(search.best(), moved_->filter);
       return;
     }
@@ -452,6 +462,7 @@ void SensorWatch::think_again() noexcept {
   go_on_from(moved_->filter, trial);
   search_from(trial, search);
   moved_->explained = 1;
+  memory_->is_jump_known = false;
   memory_->in_vain = 0;
 }
 
@@ -469,7 +480,7 @@ void SensorWatch::end_dispute() noexcept {
   slip_probability_ = 0.0;
   disputed_samples_ = unplaced_samples_ = 0;
   if (memory_->second_thought) memory_->second_thought->cancel();
-  for (Hypothesis* each : {slip_.get(), edge_.get(), moved_.get(), blind_.get()}) {
+  for (Hypothesis* each : {slip_.get(), edge_.get(), moved_.get(), back_.get(), blind_.get()}) {
     each->is_active = each->is_informed = false;
     each->explained = each->refuted = 0;
   }

@@ -103,12 +103,16 @@ SensorWatch::SensorWatch(std::shared_ptr<const Model> model, const Setup& setup)
     close_limits_.push_back(degrees ? chi_square_limit(degrees, std::min(setup_.gate, close_gate)) : 0.0);
   }
   const auto make = [&](const WalkingFilter::Setup& filter) {
-    return std::make_unique<Hypothesis>(Hypothesis{WalkingFilter(model, filter)});
+    auto result = std::make_unique<Hypothesis>(Hypothesis{WalkingFilter(model, filter)});
+    result->before_mean = result->filter.mean();
+    result->before_covariance = result->filter.covariance();
+    return result;
   };
   own_ = make(filter_setup(setup_));
   slip_ = make(filter_setup(setup_));
   edge_ = make(filter_setup(setup_));
   moved_ = make(filter_setup(setup_));
+  back_ = make(filter_setup(setup_));
   blind_ = make(blind_setup(*model, setup_));
   memory_ = std::make_unique<Memory>();
   memory_->stuck = StuckValues(setup_.noise.output_variances);
@@ -172,6 +176,7 @@ void SensorWatch::reset() noexcept {
   memory_->beyond_bounds = 0.0;
   memory_->impossible_samples = 0;
   memory_->was_open = false;
+  memory_->places.clear();
   memory_->undisputed_samples = setup_.calm;
   std::fill(believed_input_.begin(), believed_input_.end(), 0.0);
 }
@@ -183,6 +188,7 @@ void SensorWatch::restart(const Eigen::VectorXd& mean, const Eigen::MatrixXd& co
   is_blind_ = false;
   if (memory_->search) memory_->search->cancel();
   end_dispute();
+  memory_->places.clear();
   memory_->count = memory_->connected = 0;
   memory_->has_advanced = false;
   memory_->offsets->forget_onsets();
@@ -221,6 +227,8 @@ void SensorWatch::advance(double duration, const double* inputs, const double* m
     memory_->search->predict(inputs, duration);
     return;
   }
+  for (Hypothesis* each : {moved_.get(), back_.get()})
+    if (each->is_active && !memory_->has_advanced) each->note_before();
   note_motion(duration, inputs);
   if (memory_->count > 0) std::copy(input_.begin(), input_.end(), memory_->entries[memory_->newest].inputs.begin());
   if (is_blind_) {
@@ -236,7 +244,8 @@ void SensorWatch::advance(double duration, const double* inputs, const double* m
   if (!is_disputed_) return;
   if (slip_->is_active) slip_->filter.predict(inputs, duration);
   if (edge_->is_active) edge_->filter.predict(inputs, duration);
-  if (moved_->is_active) moved_->filter.predict(inputs, duration);
+  if (moved_->is_active || moved_->is_informed) moved_->filter.predict(inputs, duration);
+  if (back_->is_active) back_->filter.predict(inputs, duration);
   if (memory_->second_thought && memory_->second_thought->is_active())
     memory_->second_thought->predict(inputs, duration);
   if (blind_->is_active && !is_blind_) blind_->filter.predict(believed_input_.data(), duration);
@@ -309,7 +318,7 @@ SensorWatch::Finding SensorWatch::judge(double time, double* outputs, const doub
       finding = settle(time, outputs);
     } else if (is_disputed_ && std::ranges::any_of(records_, [](const Record& each) { return each.failures > 0; })) {
       // What is disputed was not measured.
-      for (Hypothesis* each : {slip_.get(), edge_.get(), moved_.get(), blind_.get()})
+      for (Hypothesis* each : {slip_.get(), edge_.get(), moved_.get(), back_.get(), blind_.get()})
         if (each->is_active) confront(*each, raw_.data(), false);
     } else if (is_any_measured) {
       // A sensor passes again of which nothing was said: either slip explains that better, or what was held was wrong.
@@ -381,7 +390,8 @@ SensorWatch::Finding SensorWatch::judge(double time, double* outputs, const doub
     quiet_[s] = findings_[s] ? 0 : quiet_[s] + 1;
     if (findings_[s]) states_[s].reasons = findings_[s] | (states_[s].reasons & reason::moved);
     const bool has_moved = (states_[s].reasons & reason::moved) != 0;
-    if (quiet_[s] >= (has_moved ? setup_.calm_after_moving : setup_.calm)) states_[s].reasons = 0;
+    const int calm = has_moved && !memory_->was_return ? setup_.calm_after_moving : setup_.calm;
+    if (quiet_[s] >= calm) states_[s].reasons = 0;
   }
   calm_samples_ = is_calm ? calm_samples_ + 1 : 0;
   if (input_findings_) inputs_.reasons = input_findings_;

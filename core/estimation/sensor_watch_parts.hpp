@@ -14,6 +14,7 @@
 #include "heading_search.hpp"
 #include "numbers.hpp"
 #include "offset_watch.hpp"
+#include "past_places.hpp"
 #include "rhec/core/base/with_size.hpp"
 #include "rhec/core/estimation/sensor_watch.hpp"
 #include "stuck_values.hpp"
@@ -30,6 +31,22 @@ struct SensorWatch::Hypothesis {
   int explained = 0, refuted = 0;
   double evidence = 0.0;     ///< log likelihood of what is not disputed, more than by the filter without the sensor
   bool is_informed = false;  ///< it has explained much before it was refuted
+  // Of a sensor that has moved, while slip jumps as well: what was known after the last samples, how many had been
+  // explained when slip was made anew, and how often in a row that was.
+  Eigen::VectorXd before_mean = {};
+  Eigen::MatrixXd before_covariance = {};
+  int new_slip_since = 0, new_slips = 0;
+
+  void begin() noexcept {
+    is_active = true;
+    explained = new_slip_since = new_slips = 0;
+    evidence = 0.0;
+    note_before();
+  }
+  void note_before() noexcept {
+    copy_numbers(filter.mean(), before_mean);
+    copy_numbers(filter.covariance(), before_covariance);
+  }
 };
 
 /// What was known after the last samples, and the motion since then.
@@ -40,6 +57,10 @@ struct SensorWatch::Memory {
   static constexpr double known_heading = 0.35;
   // Disputes longer than this many times the proof mean that nothing explains the sensors.
   static constexpr int hopeless = 3;
+  // A hypothesis that has explained so many samples in a row has learnt how the vehicle moves.
+  static constexpr int informed = 4;
+  // Slip that would be beyond its bounds by so many standard deviations has not jumped.
+  static constexpr double impossible_slip = 3.0;
 
   struct Entry {
     double time = unknown;
@@ -84,6 +105,11 @@ struct SensorWatch::Memory {
   /// By how much measurements ask for slip beyond its bounds: a cumulative sum of standard deviations (Page 1954).
   double beyond_bounds = 0.0;
   int impossible_samples = 0;  ///< in a row in which that sum was too large
+  PastPlaces places;
+  std::size_t place = 0;  ///< that the position has come back to, while that is open
+  Displacement jump;      ///< of a position that has moved, from where the estimate expected it
+  bool is_jump_known = false;
+  bool was_return = false;  ///< what was followed last
 
   /// After an update of a filter from a mean: how far slip would be beyond its bounds, in its standard deviations.
   static double slip_beyond(const WalkingFilter& filter, const Eigen::VectorXd& before,

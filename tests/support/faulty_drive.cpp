@@ -107,7 +107,7 @@ Episode drive_with_fault(const Robot& robot, const Fault& fault, std::uint64_t s
       delivery.outputs[j] += robot.output_sigmas()[j] * noise(random);
     const Eigen::Vector2d place(truth.state[roles.position_x] + moved, truth.state[roles.position_y]);
     const double slip = truth.slip();
-    truth.advance(speed, since >= 0 ? fault.slip : 0.0);
+    truth.advance(speed, since >= fault.slip_after ? fault.slip : 0.0);
     delivery.inputs = truth.inputs;
     for (std::size_t j = 0; j < delivery.inputs.size(); ++j)
       delivery.inputs[j] += robot.input_sigmas()[j] * noise(random);

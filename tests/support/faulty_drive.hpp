@@ -27,6 +27,7 @@ struct Fault {
   int length = 1;                        ///< samples
   double moved = 0.0;                    ///< by how much the world has moved from then on, along x [m]
   double slip = 0.0;                     ///< by how much the first parameter falls
+  int slip_after = 0;                    ///< samples since the fault began
   bool is_hurried = false;               ///< deadlines have passed already, from its begin on
 };
 

@@ -27,7 +27,7 @@ class WalkingFilter;
 ///     Where it does not explain the next samples all this is taken back;
 ///   - what the sensor measures has moved for good: the states that it sees are made anew, once. Where this explains
 ///     more samples than a transient may last, the estimate follows. After a time in which the sensor had said nothing
-///     it is rather the estimate that is off, and a few samples are enough;
+///     it is rather the estimate that is off, and a few samples are enough, as they are for one that has come back;
 ///   - the measured inputs are wrong: they count as typical motion, at every sample. Where neither of the others lasts
 ///     and this does, the estimate goes on without inputs until they fit again.
 /// A measurement that passes its gate again ends all of this.
@@ -143,16 +143,18 @@ class RHEC_EXPORT SensorWatch {
   double likelihood(WalkingFilter& filter, bool with_rejected) noexcept;
   void confront(Hypothesis& hypothesis, const double* outputs, bool counts) noexcept;
   Finding settle(double time, const double* outputs) noexcept;
-  Finding accept(Hypothesis& hypothesis) noexcept;
+  Finding accept(Hypothesis&hypothesis) noexcept, come_back() noexcept;
   double consider_slip() noexcept;
   bool retract_slip() noexcept;
   void consider_moved(double likelihood_of_new_slip) noexcept;
-  void begin_edge(bool is_new) noexcept;
+  void consider_return(double time) noexcept, leave_place(double time, bool after_gap) noexcept;
+  void note_jump() noexcept, note_followed() noexcept, begin_edge(bool is_new) noexcept;
+  bool has_come_back() const noexcept, changes_slip(Hypothesis&each) noexcept;
   bool goes_on() noexcept, may_follow() const noexcept, consider_slip_before() noexcept;
+  int disputed_position() const noexcept;
   void hold_back(double time, const double* outputs) noexcept;
   void acquit(const double*outputs) noexcept, end_dispute() noexcept;
-  bool sees_position(int output) const noexcept;
-  bool sees_position(const std::vector<int>& outputs) const noexcept;
+  bool sees_position(int output) const noexcept, sees_position(const std::vector<int>&outputs) const noexcept;
   bool is_position_disputed() const noexcept, is_place_lost() const noexcept, is_placed_otherwise() const noexcept;
   bool is_within_bounds(const WalkingFilter&filter) const noexcept, is_probably_slip() const noexcept;
   void test_inputs(const double* outputs) noexcept;
@@ -170,7 +172,7 @@ class RHEC_EXPORT SensorWatch {
   bool is_unobserved_ = false;                 ///< the motion since the last sample is not known
   double usual_volume_ = 0.0;  ///< mean log sqrt(det P) of late, where nothing was missing; NaN: none yet
   int aftermath_ = 0;          ///< estimates since something was missing, counted down
-  std::unique_ptr<Hypothesis> own_, slip_, edge_, moved_, blind_;  ///< edge_: slip that goes on jumping
+  std::unique_ptr<Hypothesis> own_, slip_, edge_, moved_, back_, blind_;  ///< edge_: slip that goes on jumping
   std::unique_ptr<Memory> memory_;
   bool is_active_ = false, is_disputed_ = false, is_blind_ = false;
   double slip_probability_ = 0.0;  ///< that slip has jumped, while that is open
