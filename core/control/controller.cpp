@@ -343,8 +343,8 @@ void Controller::look_ahead(double arc_length, const double* parameters) noexcep
   }
 }
 
-/// Bounds the inputs that drive straight ahead by those for the fastest reference of the horizon without slip, in the
-/// directions that it goes. Where it only stands, forwards is one of them.
+/// Bounds the inputs that drive straight ahead further, by those for the fastest reference of the horizon without slip,
+/// in the directions that it goes. Where it only stands, forwards is one of them.
 void Controller::bound_speed() noexcept {
   double fastest = 0.0, least = 0.0, most = 0.0;
   for (const PathPoint& point : points_) {
@@ -365,12 +365,18 @@ void Controller::bound_speed() noexcept {
     for (int j = 0; j < nu; ++j) {
       const auto [lower, upper] = std::minmax({0.0, smallest_[nx + j], largest_[nx + j]});
       if (lower == 0.0 && upper == 0.0) continue;
-      if (held_state_[j] >= 0) {
-        problem_.set_state_bounds(held_state_[j], lower, upper);
+      // Within the input's own bounds.
+      const int held = held_state_[j];
+      const RhcProblem::Setup& own = problem_.setup();
+      const double least_own = held >= 0 ? own.state_lower[held] : own.input_lower[j];
+      const double most_own = held >= 0 ? own.state_upper[held] : own.input_upper[j];
+      const auto within = [&](double speed) { return std::min(std::max(speed, least_own), most_own); };
+      if (held >= 0) {
+        problem_.set_state_bounds(held, within(lower), within(upper));
         continue;
       }
-      problem_.input_lower(i, j) = lower;
-      problem_.input_upper(i, j) = upper;
+      problem_.input_lower(i, j) = within(lower);
+      problem_.input_upper(i, j) = within(upper);
     }
   }
 }
