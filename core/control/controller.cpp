@@ -114,7 +114,8 @@ Controller::Controller(std::shared_ptr<const Model> model, std::shared_ptr<Solve
       problem_(make_problem(vehicle_, setup_, held_state_)),
       solver_(std::move(solver)),
       shifter_(problem_),
-      point_(problem_.capacity()) {
+      point_(problem_.capacity()),
+      relaxed_plan_(problem_.capacity()) {
   if (const std::string& reason = path_.why_not_drivable(); !reason.empty()) throw Error(reason);
   const Setup::Pace& pace = setup_.pace;
   if (!(pace.degraded >= 0.0 && pace.degraded <= 1.0 && pace.lost >= 0.0 && pace.lost <= 1.0 && pace.seconds > 0.0))
@@ -473,10 +474,24 @@ const Controller::Command& Controller::control(const Estimate& estimate, Clock::
     if (!from_plan) start_cold();
   }
   bool is_found = find_plan(deadline);
-  if (!is_found && from_plan) {
+  if (from_plan && (!is_found || command_.report.status == Status::relaxed)) {
     // The last plan may be a bad guess, e.g. after a jump of the estimate: try a simulation instead.
+    if (is_found) solver_->finish(point_, command_.report);
+    const bool is_relaxed = is_found && is_usable(command_.report.status);
+    const double violation = is_relaxed ? plan_violation() : 0.0;
+    if (is_relaxed) {
+      relaxed_plan_ = point_;
+      relaxed_report_ = command_.report;
+    }
     start_cold();
-    is_found = find_plan(deadline);
+    is_found = find_plan(deadline) && (!is_relaxed || plan_violation() <= violation);
+    if (!is_found && is_relaxed) {
+      // Nor does a simulation lead to a plan that keeps the limits: the one that violates them least.
+      point_ = relaxed_plan_;
+      command_.report = relaxed_report_;
+      plan_inputs(0, command_.inputs.data());
+      is_found = true;
+    }
     command_.report.fallback_used = true;
   }
   command_.fallback = !is_found;
@@ -516,6 +531,20 @@ void Controller::finish() noexcept {
   if (!has_plan_) return;
   shifter_.take(problem_, point_);
   if (!command_.fallback) has_plan_ = is_finite(problem_, point_);
+}
+
+/// The sum by which a plan violates hard limits.
+double Controller::plan_violation() noexcept {
+  double sum = 0.0;
+  problem_.evaluate_limits(point_, limit_values_.data(), scratch_);
+  for (int i = 0; i <= problem_.intervals(); ++i) {
+    const double* const values =
+        limit_values_.data() + static_cast<std::ptrdiff_t>(i) * problem_.capacity().limit_row();
+    const double *lower = problem_.limit_lower(i), *upper = problem_.limit_upper(i), *price = problem_.limit_linear(i);
+    for (int r = 0; r < problem_.limit_count(i); ++r)
+      if (std::isinf(price[r])) sum += std::max({0.0, lower[r] - values[r], values[r] - upper[r]});
+  }
+  return sum;
 }
 
 /// Of the limits that the vehicle meets next, whose data are still those of the last sample.
