@@ -1,10 +1,13 @@
 #include <fmt/format.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
 #include <exception>
 #include <filesystem>
+#include <fstream>
 #include <new>
 #include <string>
 #include <system_error>
@@ -13,6 +16,7 @@
 #include "commands.hpp"
 #include "crash_report.hpp"
 #include "rhec/core/base/error.hpp"
+#include "rhec/plugins/robot/memory_need.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
 #include "version.hpp"
 
@@ -132,6 +136,20 @@ void finish_output() {
 
 namespace {
 
+/// Linux grants more than there is, and ends a program that uses it without a word. With this limit, such an allocation
+/// fails instead, which is told.
+void limit_memory() {
+  double total = 0, resident = 0, shared = 0, text = 0, libraries = 0, data = 0;  // [pages], proc(5)
+  std::ifstream statm("/proc/self/statm");
+  struct rlimit limit {};
+  if (!(statm >> total >> resident >> shared >> text >> libraries >> data) || getrlimit(RLIMIT_DATA, &limit) != 0)
+    return;
+  const double most = data * static_cast<double>(sysconf(_SC_PAGESIZE)) + rhec::free_memory();
+  if (!(most < static_cast<double>(limit.rlim_cur))) return;
+  limit.rlim_cur = static_cast<rlim_t>(most);
+  setrlimit(RLIMIT_DATA, &limit);
+}
+
 int run_and_tell(int count, char** words) {
   try {
     const int code = rhec::apps::run(count, words);
@@ -145,8 +163,11 @@ int run_and_tell(int count, char** words) {
     else
       fmt::print(stderr, "rhec: error: failed unexpectedly: {}\n", failure.what());
   } catch (const std::bad_alloc&) {
-    fmt::print(stderr,
-               "rhec: error: there is not enough memory; expected shorter horizons and logs, or a machine with more\n");
+    std::fputs(
+        "rhec: error: there is not enough memory; expected shorter horizons and logs, coarser grids and maps, or a "
+        "machine "
+        "with more\n",
+        stderr);  // which needs none
   } catch (const std::exception& failure) {
     fmt::print(stderr, "rhec: error: failed unexpectedly: {}\n", failure.what());
   }
@@ -157,6 +178,7 @@ int run_and_tell(int count, char** words) {
 
 int main(int count, char** words) {
   rhec::apps::install_crash_report();
+  limit_memory();
   const int code = run_and_tell(count, words);
   rhec::apps::end_crash_report();
   return code;

@@ -114,7 +114,8 @@ Controller::Controller(std::shared_ptr<const Model> model, std::shared_ptr<Solve
       problem_(make_problem(vehicle_, setup_, held_state_)),
       solver_(std::move(solver)),
       shifter_(problem_),
-      point_(problem_.capacity()) {
+      point_(problem_.capacity()),
+      relaxed_plan_(problem_.capacity()) {
   if (const std::string& reason = path_.why_not_drivable(); !reason.empty()) throw Error(reason);
   const Setup::Pace& pace = setup_.pace;
   if (!(pace.degraded >= 0.0 && pace.degraded <= 1.0 && pace.lost >= 0.0 && pace.lost <= 1.0 && pace.seconds > 0.0))
@@ -343,8 +344,8 @@ void Controller::look_ahead(double arc_length, const double* parameters) noexcep
   }
 }
 
-/// Bounds the inputs that drive straight ahead by those for the fastest reference of the horizon without slip, in the
-/// directions that it goes. Where it only stands, forwards is one of them.
+/// Bounds the inputs that drive straight ahead further, by those for the fastest reference of the horizon without slip,
+/// in the directions that it goes. Where it only stands, forwards is one of them.
 void Controller::bound_speed() noexcept {
   double fastest = 0.0, least = 0.0, most = 0.0;
   for (const PathPoint& point : points_) {
@@ -365,12 +366,18 @@ void Controller::bound_speed() noexcept {
     for (int j = 0; j < nu; ++j) {
       const auto [lower, upper] = std::minmax({0.0, smallest_[nx + j], largest_[nx + j]});
       if (lower == 0.0 && upper == 0.0) continue;
-      if (held_state_[j] >= 0) {
-        problem_.set_state_bounds(held_state_[j], lower, upper);
+      // Within the input's own bounds.
+      const int held = held_state_[j];
+      const RhcProblem::Setup& own = problem_.setup();
+      const double least_own = held >= 0 ? own.state_lower[held] : own.input_lower[j];
+      const double most_own = held >= 0 ? own.state_upper[held] : own.input_upper[j];
+      const auto within = [&](double speed) { return std::min(std::max(speed, least_own), most_own); };
+      if (held >= 0) {
+        problem_.set_state_bounds(held, within(lower), within(upper));
         continue;
       }
-      problem_.input_lower(i, j) = lower;
-      problem_.input_upper(i, j) = upper;
+      problem_.input_lower(i, j) = within(lower);
+      problem_.input_upper(i, j) = within(upper);
     }
   }
 }
@@ -467,10 +474,24 @@ const Controller::Command& Controller::control(const Estimate& estimate, Clock::
     if (!from_plan) start_cold();
   }
   bool is_found = find_plan(deadline);
-  if (!is_found && from_plan) {
+  if (from_plan && (!is_found || command_.report.status == Status::relaxed)) {
     // The last plan may be a bad guess, e.g. after a jump of the estimate: try a simulation instead.
+    if (is_found) solver_->finish(point_, command_.report);
+    const bool is_relaxed = is_found && is_usable(command_.report.status);
+    const double violation = is_relaxed ? plan_violation() : 0.0;
+    if (is_relaxed) {
+      relaxed_plan_ = point_;
+      relaxed_report_ = command_.report;
+    }
     start_cold();
-    is_found = find_plan(deadline);
+    is_found = find_plan(deadline) && (!is_relaxed || plan_violation() <= violation);
+    if (!is_found && is_relaxed) {
+      // Nor does a simulation lead to a plan that keeps the limits: the one that violates them least.
+      point_ = relaxed_plan_;
+      command_.report = relaxed_report_;
+      plan_inputs(0, command_.inputs.data());
+      is_found = true;
+    }
     command_.report.fallback_used = true;
   }
   command_.fallback = !is_found;
@@ -510,6 +531,20 @@ void Controller::finish() noexcept {
   if (!has_plan_) return;
   shifter_.take(problem_, point_);
   if (!command_.fallback) has_plan_ = is_finite(problem_, point_);
+}
+
+/// The sum by which a plan violates hard limits.
+double Controller::plan_violation() noexcept {
+  double sum = 0.0;
+  problem_.evaluate_limits(point_, limit_values_.data(), scratch_);
+  for (int i = 0; i <= problem_.intervals(); ++i) {
+    const double* const values =
+        limit_values_.data() + static_cast<std::ptrdiff_t>(i) * problem_.capacity().limit_row();
+    const double *lower = problem_.limit_lower(i), *upper = problem_.limit_upper(i), *price = problem_.limit_linear(i);
+    for (int r = 0; r < problem_.limit_count(i); ++r)
+      if (std::isinf(price[r])) sum += std::max({0.0, lower[r] - values[r], values[r] - upper[r]});
+  }
+  return sum;
 }
 
 /// Of the limits that the vehicle meets next, whose data are still those of the last sample.

@@ -12,6 +12,8 @@ const char* name_of(Status status) noexcept {
       return "solved";
     case Status::step_taken:
       return "step_taken";
+    case Status::relaxed:
+      return "relaxed";
     case Status::iteration_limit:
       return "iteration_limit";
     case Status::deadline:
@@ -32,6 +34,10 @@ const char* advice_for(Status status) noexcept {
       return "Nothing to do.";
     case Status::step_taken:
       return "One real-time iteration was taken; use mode: converge where full accuracy is needed.";
+    case Status::relaxed:
+      return "Hard limits could not be kept around the last plan, and were violated least; soft ones, or more room, "
+             "leave "
+             "a choice.";
     case Status::iteration_limit:
       return "Raise max_iterations, give a better initial guess, or loosen the tolerance.";
     case Status::deadline:

@@ -14,6 +14,15 @@ double FiniteValue::read(const Settings& from, const OptionContext& context) con
   return number;
 }
 
+double SigmaValue::read(const Settings& from, const OptionContext& context) const {
+  constexpr double least = 1e-100, most = 1e100;
+  const double sigma = FiniteValue{range}.read(from, context);
+  if (sigma != 0.0 && !(sigma >= least && sigma <= most))
+    throw from.mismatch(
+        fmt::format("a standard deviation between {:g} and {:g}, whose square is a number", least, most));
+  return sigma;
+}
+
 std::pair<double, double> BoundsValue::read(const Settings& from, const OptionContext&) const {
   if (from.kind() != Settings::Kind::list || from.items().size() != 2)
     throw from.mismatch("a list [lower, upper]; null for no bound");

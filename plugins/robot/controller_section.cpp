@@ -12,6 +12,7 @@
 #include "rhec/plugins/robot/bounds_section.hpp"
 #include "rhec/plugins/robot/by_name.hpp"
 #include "rhec/plugins/robot/integration.hpp"
+#include "rhec/plugins/robot/memory_need.hpp"
 #include "rhec/plugins/robot/spans.hpp"
 
 #include "default_solver.hpp"
@@ -170,10 +171,10 @@ OptionSection ControllerSection::documentation() {
 
 PluginChoice ControllerSection::solver_choice() const { return default_solver.choice(options_.solver); }
 
-void ControllerSection::add_problem(Controller::Setup& setup) const {
+void ControllerSection::add_problem(Controller::Setup& setup, int intervals) const {
   const ModelDescription& about = context_->about;
   RhcProblem::Setup& problem = setup.problem;
-  problem.max_intervals = options_.horizon;
+  problem.max_intervals = intervals;
   const WeightOptions weights = WeightOptions::table().parse(options_.weights, "controller: weights");
   const std::vector<double> stage = stage_by_name().read(weights.stage, about);
   const auto first_input = stage.begin() + static_cast<std::ptrdiff_t>(about.states.size());
@@ -195,14 +196,14 @@ void ControllerSection::add_problem(Controller::Setup& setup) const {
   }
 }
 
-void ControllerSection::add_blockings(Controller::Setup& setup) const {
+void ControllerSection::add_blockings(Controller::Setup& setup, int intervals) const {
   const std::vector<Variable>& inputs = context_->about.inputs;
   check_keys(options_.blocking, names_of(inputs), "controller: blocking");
   for (std::size_t j = 0; j < inputs.size(); ++j) {
     const Settings* section = options_.blocking.find(inputs[j].name);
     if (!section) continue;
     auto blocking = of_input.make(context_->host, *section);
-    if (const std::string reason = blocking->why_not(options_.horizon); !reason.empty())
+    if (const std::string reason = blocking->why_not(intervals); !reason.empty())
       throw section->error(fmt::format("{}; change it or controller.horizon", reason));
     if (blocking->transition() != Transition::step || blocking->neighbour_sigma())
       throw section->error(
@@ -231,25 +232,31 @@ void ControllerSection::add_terms(Controller::Setup& setup) const {
 
 std::unique_ptr<Controller> ControllerSection::make(const Path& path, const RobotHooks& hooks,
                                                     std::shared_ptr<const SlipAhead> ahead) const {
-  Controller::Setup setup;
   std::vector<double> parameters;
   for (const Variable& parameter : context_->about.parameters) parameters.push_back(middle_value(parameter));
   const Integration integration =
       integration_of(options_.integrator, options_.substeps, section_, context_, parameters, path.top_speed());
-  setup.problem.substeps = integration.substeps;
-  add_problem(setup);
-  setup.interval = context_->step;
-  setup.search.stop_time = context_->step;
-  setup.pace = {options_.health.degraded, options_.health.lost, options_.health.seconds};
-  setup.reference_speed = options_.reference_speed;
-  setup.least_speed_factor = options_.least_speed_factor;
-  setup.speed_bound_factor = options_.speed_bound_factor;
-  setup.speed_bound_offset = options_.speed_bound_offset;
-  setup.ahead = std::move(ahead);
-  add_blockings(setup);
-  add_terms(setup);
-  auto solver = hooks.wrap_solver("rhc", default_solver.make(context_->host, options_.solver));
-  return std::make_unique<Controller>(integration.context->model, std::move(solver), path, std::move(setup));
+  const auto make_for = [&](int intervals, std::shared_ptr<Solver> solver) {
+    Controller::Setup setup;
+    setup.problem.substeps = integration.substeps;
+    add_problem(setup, intervals);
+    setup.interval = context_->step;
+    setup.search.stop_time = context_->step;
+    setup.pace = {options_.health.degraded, options_.health.lost, options_.health.seconds};
+    setup.reference_speed = options_.reference_speed;
+    setup.least_speed_factor = options_.least_speed_factor;
+    setup.speed_bound_factor = options_.speed_bound_factor;
+    setup.speed_bound_offset = options_.speed_bound_offset;
+    setup.ahead = ahead;
+    add_blockings(setup, intervals);
+    add_terms(setup);
+    return std::make_unique<Controller>(integration.context->model, std::move(solver), path, std::move(setup));
+  };
+  const auto make_solver = [&] { return default_solver.make(context_->host, options_.solver); };
+  const Settings* const horizon = section_.find("horizon");
+  require_memory(horizon ? *horizon : section_, {.intervals = options_.horizon},
+                 [&](int intervals) -> std::shared_ptr<const void> { return make_for(intervals, make_solver()); });
+  return make_for(options_.horizon, hooks.wrap_solver("rhc", make_solver()));
 }
 
 }  // namespace rhec

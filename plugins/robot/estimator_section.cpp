@@ -9,6 +9,7 @@
 
 #include "rhec/plugins/robot/by_name.hpp"
 #include "rhec/plugins/robot/integration.hpp"
+#include "rhec/plugins/robot/memory_need.hpp"
 #include "rhec/plugins/robot/plugin_option.hpp"
 #include "rhec/plugins/robot/robust_losses.hpp"
 #include "rhec/plugins/robot/sensors.hpp"
@@ -36,16 +37,16 @@ struct ArrivalOptions {
   }
 };
 
-const NumbersByName& process_noise_by_name() {
-  static const NumbersByName map(
+const SigmasByName& process_noise_by_name() {
+  static const SigmasByName map(
       "process_noise", {at_least(0.0)},
       {{"PARAMETER", &ModelDescription::parameters, constant_default(ParameterWalk{}.process_noise),
         "standard deviation per square root of a step, added at each slide"}});
   return map;
 }
 
-const NumbersByName& restart_sigma_by_name() {
-  static const NumbersByName map(
+const SigmasByName& restart_sigma_by_name() {
+  static const SigmasByName map(
       "restart_sigma", {greater_than(0.0)},
       {{"PARAMETER", &ModelDescription::parameters, constant_default(ParameterWalk{}.restart_sigma),
         "standard deviation with which an unlinked block starts once it is the window's first"}});
@@ -92,9 +93,9 @@ const NumbersByName& initial_parameters_by_name() {
   return map;
 }
 
-const NumbersByName& initial_sigma_by_name() {
+const SigmasByName& initial_sigma_by_name() {
   constexpr const char* meaning = "standard deviation at the start";
-  static const NumbersByName map(
+  static const SigmasByName map(
       "initial sigma", {greater_than(0.0)},
       {{"STATE", &ModelDescription::states, scaled_default(state_share), meaning},
        {"PARAMETER", &ModelDescription::parameters, scaled_default(parameter_share), meaning}});
@@ -254,6 +255,21 @@ std::unique_ptr<SensorWatch> EstimatorSection::make_watch_for(const EstimatorMak
   return make_watch(options_.health, parts);
 }
 
+/// A window needs memory for each interval, and a filter for each node that it remembers.
+void EstimatorSection::require_memory_for(const EstimatorMaker& maker) const {
+  EstimatorParts fewer = parts_;
+  if (fewer.memory.is_given()) fewer.make_map = [map = parts_.make_map()] { return map; };
+  const Settings& section = parts_.section;
+  const Settings *horizon = section.find("horizon"), *between = section.find("between");
+  const bool is_long = parts_.horizon > EstimatorOptions{}.horizon || !between;
+  const Settings& place = is_long && horizon ? *horizon : between ? *between : section;
+  require_memory(place, {parts_.horizon, parts_.most_between, "estimator.between"},
+                 [&](int intervals) -> std::shared_ptr<const void> {
+                   fewer.horizon = intervals;
+                   return maker.make(fewer);
+                 });
+}
+
 std::unique_ptr<Estimator> EstimatorSection::make(const std::optional<Eigen::VectorXd>& initial_state,
                                                   const RobotHooks& hooks) const {
   EstimatorParts with_hooks = parts(initial_state);
@@ -264,6 +280,7 @@ std::unique_ptr<Estimator> EstimatorSection::make(const std::optional<Eigen::Vec
   timeline.delays = delays_;
   timeline.output_sigmas = parts_.context->noise.output_sigmas;
   const EstimatorMaker& maker = makers_.named(options_.name);
+  require_memory_for(maker);
   auto method = hooks.wrap_method(maker.make(with_hooks));
   auto watch = make_watch_for(maker, with_hooks);
   if (!watch) return std::make_unique<Estimator>(std::move(method), timeline);

@@ -1,12 +1,14 @@
 #include "rhec/plugins/robot/memory_section.hpp"
 
 #include <cmath>
+#include <new>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/prior/prior_options.hpp"
+#include "rhec/plugins/robot/memory_need.hpp"
 
 namespace rhec {
 namespace {
@@ -79,7 +81,14 @@ MemorySection::MemorySection(std::shared_ptr<const RobotContext> context, const 
   if (context_->about.parameters.empty() || roles.position_x < 0 || roles.position_y < 0)
     throw section_.error(fmt::format("a memory of places needs a model with parameters and a position; '{}' is none",
                                      context_->about.name));
-  make_map();  // reports mistakes now
+  try {
+    make_map();  // reports mistakes now
+  } catch (const std::bad_alloc&) {
+    const Settings* const cells = section_.find("cells");
+    throw(cells ? *cells : section_)
+        .error(fmt::format("there is not enough memory for a map of {} cells: {:.3g} GB are free; expected fewer cells",
+                           options_.cells, free_memory() / 1e9));
+  }
 }
 
 std::vector<OptionRow> MemorySection::rows() { return MemoryOptions::table().schema(); }

@@ -13,21 +13,21 @@ namespace {
 
 constexpr double share = 0.01;  // of a variable's typical magnitude
 
-const NumbersByName& outputs_by_name() {
-  static const NumbersByName map(
+const SigmasByName& outputs_by_name() {
+  static const SigmasByName map(
       "noise of outputs", {greater_than(0.0)},
       {{"OUTPUT", &ModelDescription::outputs, scaled_default(share), "of a measured output"}});
   return map;
 }
 
-const NumbersByName& inputs_by_name() {
-  static const NumbersByName map("noise of inputs", {greater_than(0.0)},
-                                 {{"INPUT", &ModelDescription::inputs, scaled_default(share), "of a measured input"}});
+const SigmasByName& inputs_by_name() {
+  static const SigmasByName map("noise of inputs", {greater_than(0.0)},
+                                {{"INPUT", &ModelDescription::inputs, scaled_default(share), "of a measured input"}});
   return map;
 }
 
-const NumbersByName& states_by_name() {
-  static const NumbersByName map(
+const SigmasByName& states_by_name() {
+  static const SigmasByName map(
       "noise of states", {at_least(0.0)},
       {{"STATE", &ModelDescription::states, constant_default(0.0),
         "process noise: by how much it strays from the model in a second, as a random walk; per square root of a "
@@ -46,6 +46,8 @@ struct SensorErrorValue {
   }
   static SensorError read(const Settings& from, const OptionContext& context) {
     SensorError error = table().parse(from, context.owner);
+    for (const char* const key : {"sigma", "drift"})
+      if (const Settings* const given = from.find(key)) SigmaValue{any()}.read(*given, context);
     if (!(std::isfinite(error.sigma) && error.sigma > 0.0 && std::isfinite(error.drift)))
       throw from.error("expected a finite sigma above 0, and a finite drift, as in {sigma: 0.02, drift: 0.001}");
     return error;

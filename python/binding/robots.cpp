@@ -63,7 +63,7 @@ void bind_reports(py::module_& module) {
   py::class_<Report>(module, "Report", "What a solver says of one solve.")
       .def_property_readonly(
           "status", [](const Report& self) { return name_of(self.status); },
-          "solved, step_taken, iteration_limit, deadline, infeasible, stalled or bad_input")
+          "solved, step_taken, relaxed, iteration_limit, deadline, infeasible, stalled or bad_input")
       .def_property_readonly(
           "usable", [](const Report& self) { return is_usable(self.status); },
           "whether the result may be used: all but infeasible and bad_input")

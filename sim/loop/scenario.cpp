@@ -180,6 +180,23 @@ void require_few_waypoints(const Settings& section, double length, double spacin
                          length, spacing, most_waypoints));
 }
 
+constexpr double least_way = 1e-6;  // [m]
+
+/// A path of waypoints that lie in one place is none.
+void require_a_way(const Settings& section, std::string_view size, const std::vector<Waypoint>& waypoints,
+                   double spacing) {
+  const auto apart = [&](const Waypoint& waypoint) {
+    return std::hypot(waypoint.x - waypoints.front().x, waypoint.y - waypoints.front().y) >= least_way;
+  };
+  if (std::any_of(waypoints.begin(), waypoints.end(), apart)) return;
+  const Settings* const place = section.find(size);
+  throw(place ? *place : key_or_section(section, "spacing"))
+      .error(
+          fmt::format("the {} waypoints, {} m from each other at most, are all in one place; expected a longer path, "
+                      "or a smaller path.spacing",
+                      waypoints.size(), spacing));
+}
+
 std::vector<Waypoint> make_waypoints(const ScenarioOptions& options, const PathOptions& path) {
   struct {
     ZigZag zig_zag;
@@ -217,7 +234,14 @@ std::vector<Waypoint> make_waypoints(const ScenarioOptions& options, const PathO
 
 Path make_path(const ScenarioOptions& options) {
   const PathOptions path = path_table().parse(options.path, "path");
-  return {make_waypoints(options, path),
+  std::vector<Waypoint> waypoints = make_waypoints(options, path);
+  if (path.name != PathOptions::Name::file)
+    require_a_way(options.path,
+                  path.name == PathOptions::Name::figure8  ? "radius"
+                  : path.name == PathOptions::Name::zigzag ? "leg_length"
+                                                           : "row_length",
+                  waypoints, path.spacing);
+  return {std::move(waypoints),
           {.acceleration = path.acceleration, .lateral_acceleration = path.lateral_acceleration.value_or(infinity)}};
 }
 
@@ -270,7 +294,12 @@ std::unique_ptr<const SlipField> make_terrain(const Settings& section, int scena
   const auto seed = static_cast<std::uint64_t>(terrain.seed.value_or(scenario_seed));
   switch (terrain.name) {
     case TerrainOptions::Name::gaussian:
-      return gaussian_random_field({seed, ranges, terrain.correlation_length, terrain.period});
+      try {
+        return gaussian_random_field({seed, ranges, terrain.correlation_length, terrain.period});
+      } catch (const Error& mistake) {
+        const Settings* const period = section.find("period");
+        throw(period ? *period : key_or_section(section, "correlation_length")).error(mistake.what());
+      }
     case TerrainOptions::Name::patches:
       return patch_field({seed, ranges, terrain.patch_size});
     case TerrainOptions::Name::constant:
@@ -311,6 +340,7 @@ ScenarioOptions parse_scenario(const Settings& settings) {
   return ScenarioOptions::table().parse(settings, "scenario");
 }
 
+constexpr double slow_usual = 20.0;         // times the path's duration at the scenario's speed
 constexpr double quickest_usual = 40.0;     // [m/s]
 constexpr double most_acceleration = 20.0;  // of any ground vehicle, with a wide margin [m/s^2]
 constexpr double most_turn = 1.0;           // in a step [rad]
@@ -456,6 +486,13 @@ std::vector<std::string> Scenario::notes() const {
   const double quickest = path_.top_speed();
   if (quickest > quickest_usual)
     notes.push_back(fmt::format("speed: {:.4g} m/s is {:.0f} km/h; speeds are in m/s", quickest, 3.6 * quickest));
+  const double usual_time = path_.length() / options_.speed;
+  if (path_.duration() > slow_usual * usual_time)
+    notes.push_back(
+        fmt::format("path: {:.4g} m take {:.3g} s, {:.3g} steps, and at {:g} m/s they would take {:.3g} s; the speeds "
+                    "of waypoints, "
+                    "path.lateral_acceleration or path.acceleration lower the speed so much",
+                    path_.length(), path_.duration(), path_.duration() / options_.step, options_.speed, usual_time));
   const double acceleration = exceeded_along(
       path_, [](const PathPoint& point) { return point.speed * point.speed * std::abs(point.curvature); });
   if (acceleration > most_acceleration)

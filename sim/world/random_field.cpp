@@ -42,7 +42,7 @@ class Gaussian final : public SlipField {
     const double wanted = std::ceil(options.period / spacing_);
     if (wanted * wanted > 1e7) {
       throw Error(
-          fmt::format("gaussian slip field: a period of {} m takes {:.0f} x {:.0f} lattice points at a correlation "
+          fmt::format("gaussian slip field: a period of {} m takes {:.4g} x {:.4g} lattice points at a correlation "
                       "length of {} m; choose a shorter period or a longer correlation length",
                       options.period, wanted, wanted, options.correlation_length));
     }

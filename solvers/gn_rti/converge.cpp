@@ -218,12 +218,13 @@ StageQpSolver::Outcome GnRti::relax_until_feasible(StageQpSolver::Outcome outcom
   return outcome;
 }
 
-/// Solves the QP with a price on the violation of hard limits, an l1 penalty (Nocedal & Wright 2006, section 18.5).
-/// Infeasible if no step reduces the violation.
-StageQpSolver::Outcome GnRti::solve_elastic(Report& report, Clock::time_point deadline) noexcept {
+/// Solves the QP of `best_` with a price on the violation of hard limits, an l1 penalty (Nocedal & Wright 2006, section
+/// 18.5), and tells that violation `before` and `after` the step, as far as the linearisation knows.
+StageQpSolver::Outcome GnRti::solve_at_prices(Report& report, double& before, double& after,
+                                              Clock::time_point deadline) noexcept {
   const StageQp& given = linearisation_->qp();
-  const double before = costs_of_limits(best_).violation, unit = 1.0 + largest_gradient(given);
-  double after = before;
+  const double unit = 1.0 + largest_gradient(given);
+  after = before = costs_of_limits(best_).violation;
   auto outcome = StageQpSolver::Outcome::infeasible;
   is_elastic_ = true;
   asked_share_ = 1.0;
@@ -240,6 +241,13 @@ StageQpSolver::Outcome GnRti::solve_elastic(Report& report, Clock::time_point de
     const double last = std::exchange(after, violation_after(given, step_));
     if (after <= low_share * before || (after < stuck * before && after > little_less * last)) break;
   }
+  return outcome;
+}
+
+/// Infeasible if no step reduces the violation.
+StageQpSolver::Outcome GnRti::solve_elastic(Report& report, Clock::time_point deadline) noexcept {
+  double before = 0.0, after = 0.0;
+  const auto outcome = solve_at_prices(report, before, after, deadline);
   return after < stuck * before ? outcome : StageQpSolver::Outcome::infeasible;
 }
 

@@ -185,7 +185,14 @@ Report GnRti::real_time(Iterate& iterate, Clock::time_point deadline) noexcept {
     qp_ = &linearisation_->qp();
     if (!is_ready) qp_solver_.guess_from(*qp_, iterate);
     is_ready = false;
-    const auto outcome = solve_qp(report, deadline);
+    auto outcome = solve_qp(report, deadline);
+    report.status = Status::step_taken;
+    if (outcome == StageQpSolver::Outcome::infeasible && !limits_.empty()) {
+      best_ = iterate;
+      double before = 0.0, after = 0.0;
+      outcome = solve_at_prices(report, before, after, deadline);
+      report.status = Status::relaxed;
+    }
     if (outcome == StageQpSolver::Outcome::infeasible || outcome == StageQpSolver::Outcome::out_of_time) {
       report.status = outcome == StageQpSolver::Outcome::infeasible ? Status::infeasible : Status::deadline;
       break;

@@ -80,6 +80,8 @@ class GnRti final : public Solver {
   bool is_futile() noexcept;
   void begin_at(const Iterate& guess) noexcept;
   bool find_other_start(const Iterate& guess, bool is_feasible, Clock::time_point deadline) noexcept;
+  StageQpSolver::Outcome solve_at_prices(Report& report, double& before, double& after,
+                                         Clock::time_point deadline) noexcept;
   StageQpSolver::Outcome solve_elastic(Report& report, Clock::time_point deadline) noexcept;
   bool search_along_step(Report& report, double residual, double& merit_after, Clock::time_point deadline) noexcept;
   bool correct_step(const StageQp& first, Report& report, Clock::time_point deadline) noexcept;

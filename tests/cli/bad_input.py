@@ -88,6 +88,13 @@ SETTINGS = [
     ("controller.blocking={u1: {name: pattern}}", "at least one block length"),
     ("noise.outputs.x_gps=-1", "greater than 0"),
     ("noise.outputs.x_gps=0", "greater than 0"),
+    ("noise.outputs.x_gps=1e-300", "noise.outputs.x_gps: found '1e-300', expected a standard deviation between 1e-100 and 1e+100"),
+    ("noise.inputs.u1=1e300", "noise.inputs.u1: found '1e300', expected a standard deviation"),
+    ("noise.states.beta=1e-300", "noise.states.beta: found '1e-300', expected a standard deviation"),
+    ("noise.biases={delta: {sigma: 1e300}}", "noise.biases.delta.sigma: found '1e300'"),
+    ("noise.scales={delta: {sigma: 0.1, drift: 1e300}}", "noise.scales.delta.drift: found '1e300'"),
+    ("estimator.initial.sigma={beta: 1e300}", "estimator.initial.sigma.beta: found '1e300'"),
+    ("estimator.process_noise.kappa=1e300", "estimator.process_noise.kappa: found '1e300'"),
     ("noise.inputs.u1=.inf", "finite"),
     ("estimator.initial.sigma={beta: -1}", "greater than 0"),
     ("estimator.initial.parameters={kappa: .inf}", "finite"),
@@ -105,6 +112,10 @@ SETTINGS = [
     ("path.laps=0", "between 1"),
     ("path.radius=0", "greater than 0"),
     ("path.spacing=1e-9", "more than 2e+06"),
+    ("path.radius=1e-9", "path.radius: the 3 waypoints, 0.1 m from each other at most, are all in one place"),
+    ("path.spacing=1e300", "are all in one place; expected a longer path, or a smaller path.spacing"),
+    ("terrain.correlation_length=1e-9", "terrain.correlation_length: gaussian slip field: a period of 500 m takes 7.143e+11 x"),
+    ("terrain.period=1e300", "terrain.period: gaussian slip field: a period of 1e+300 m"),
     ("terrain.lower=2", "expected lower <= upper"),
     ("terrain.correlation_length=0", "greater than 0"),
     ("vehicle.step=0", "between 1e-06"),
@@ -282,10 +293,20 @@ class Test(cli.Findings):
         """A horizon that there is no memory for; a program with sanitizers needs more address space than any limit."""
         if re.search(r"preset +(asan|tsan)", self.rhec("--version").stdout):
             return
-        most = 600 << 20
-        result = self.rhec("run", FIGURE8, "--out", self.out, "--set", "estimator.horizon=100000",
-                           preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (most, most)))
-        self.refused("no memory", result, ERROR, "not enough memory", "shorter horizons")
+
+        def within(most, *words):
+            return self.rhec("run", FIGURE8, "--out", self.out, *assignments(*words),
+                             preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_DATA, (most, most)))
+
+        for key, room in (("estimator.horizon", "estimator.between"), ("controller.horizon", "")):
+            for value in ("100000", "20000 s"):
+                self.refused(f"{key}: {value}", within(600 << 20, f"{key}={value}"), ERROR, f"--set {key}={value}: {key}: 100000 intervals of",
+                             "GB of memory", "GB are free", "expected at most", room)
+        self.refused("room", within(200 << 20, "estimator.between=10000"), ERROR, "--set estimator.between=10000: estimator.between: 15 intervals")
+        self.refused("cells", within(600 << 20, "estimator.memory={name: place, cells: 100000000}"), ERROR,
+                     "estimator.memory", "a map of 100000000 cells", "GB are free")
+        # Where what fails is not known before, the program says so, from as little as it starts with.
+        self.refused("no memory", within(6 << 20, "estimator.name=bank"), ERROR, "not enough memory", "shorter horizons")
 
     def files(self):
         scenario = self.work / "scenario.yaml"

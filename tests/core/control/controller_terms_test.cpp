@@ -205,6 +205,31 @@ TEST(ControllerTerms, ThatAreSoftKeepToTheMiddleWhereThereIsNoRoom) {
   }
 }
 
+TEST(ControllerTerms, ThatAreHardAndCannotBeKeptAreViolatedLeast) {
+  // By a push sideways, to where no plan is inside the corridor at once.
+  for (const double aside : {1.5, 2.0, -2.5}) {
+    Drive drive("terms: [{name: corridor, left: 1, right: 1, hard: true}]");
+    for (int k = 0; k < 10; ++k) EXPECT_FALSE(drive.advance().fallback);
+    drive.now.state[1] += aside;
+    drive.now.state[2] += aside > 0.0 ? 0.2 : -0.2;
+    const long before = allocation_count();
+    drive.controller->control(drive.now);
+    drive.controller->finish();
+    EXPECT_EQ(allocation_count(), before);
+    int relaxed = 0, outside = 0;
+    for (int k = 0; k < 40; ++k) {
+      const Controller::Command& command = drive.advance();
+      EXPECT_FALSE(command.fallback) << aside << ", " << k << ": the last plan leads away";
+      relaxed += command.report.status == Status::relaxed;
+      outside += std::abs(drive.now.state[1]) > 1.0 + 1e-3;
+    }
+    EXPECT_GT(relaxed, 0) << aside;
+    EXPECT_LT(outside, 12) << aside;
+    EXPECT_LT(std::abs(drive.now.state[1]), 0.3) << aside;
+    EXPECT_EQ(drive.advance().report.status, Status::step_taken) << aside;
+  }
+}
+
 TEST(ControllerTerms, AreReadOneByOneAndRefusedInWords) {
   const auto refused = [](const std::string& section) { return error_of([&] { Drive drive(section); }); };
   EXPECT_THAT(refused("terms: {name: corridor}"), HasSubstr("controller.terms: found a map, expected a list of terms"));

@@ -153,6 +153,21 @@ TEST(ControllerReference, BoundsTheInputsThatDriveAndNoOthers) {
   EXPECT_EQ(free->problem().input_upper(3, 0), std::numeric_limits<double>::infinity());
 }
 
+TEST(ControllerReference, KeepsTheInputsOwnBoundsWhereTheyAreNarrower) {
+  const auto slow = controller_for("{model: bicycle_slip, bounds: {u1: [-1, 1.5]}}");
+  EXPECT_THAT(reference(*slow, {0.5, 1.0}), ElementsAre(1.5, 0.0));
+  EXPECT_EQ(slow->problem().input_lower(3, 0), 0.0);
+  EXPECT_EQ(slow->problem().input_upper(3, 0), 1.5);
+  const auto rates =
+      controller_for("{model: bicycle_slip, bounds: {u1: [-1, 1.5]}, controller: {weights: {rates: {u1: 1}}}}");
+  reference(*rates, {0.5, 1.0});
+  EXPECT_EQ(rates->problem().state_upper(3)[4], 1.5) << "where the input is a state of the problem";
+  const auto quick = controller_for("{model: bicycle_slip, bounds: {u1: [1, 100]}}");
+  reference(*quick, {1.0, 1.0});
+  EXPECT_EQ(quick->problem().input_lower(3, 0), 1.0);
+  EXPECT_EQ(quick->problem().input_upper(3, 0), 2.5 * speed + 1.0);
+}
+
 /// The estimate of a vehicle that is somewhere, without slip.
 Estimate estimate_at(const Controller& controller, double x, double y, double heading) {
   const Model& model = controller.vehicle();

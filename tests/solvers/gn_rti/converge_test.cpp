@@ -188,6 +188,35 @@ TEST(GnRtiLimits, SaysSoWhereHardLimitsContradictEachOtherAndSoftOnesDoNot) {
   }
 }
 
+TEST(GnRtiLimits, RealTimeStepsViolateLeastWhatCannotBeKept) {
+  for (unsigned seed = 1; seed <= 8; ++seed) {
+    Case one(seed, 0.1, infinity, 0.0);
+    if (!one.is_solved) continue;
+    const int ns = one.problem->capacity().states;
+    one.limited->clear_limits();
+    Iterate iterate = one.start;
+    const auto solver = gn_rti("{mode: rti}");
+    solver->setup(*one.limited);
+    ASSERT_TRUE(is_usable(solver->solve(iterate).status));
+    // Of one input: above what the other limit, of twice the room beyond it, asks for.
+    const double now = iterate.control(2)[0];
+    one.limited->add(2, Limit{.kind = Limit::Kind::linear, .of = {ns}, .with = {1.0}, .lower = now + 0.2});
+    one.limited->add(2, Limit{.kind = Limit::Kind::linear, .of = {ns}, .with = {1.0}, .upper = now + 0.1});
+    const long before = allocation_count();
+    solver->prepare(iterate);
+    const Report report = solver->solve(iterate);
+    EXPECT_EQ(allocation_count(), before);
+    EXPECT_EQ(report.status, Status::relaxed);
+    EXPECT_TRUE(is_usable(report.status));
+    EXPECT_TRUE(report.fallback_used);
+    EXPECT_EQ(report.iterations, 1);
+    EXPECT_GE(iterate.control(2)[0], now + 0.1 - 1e-4) << "the sum of both is least between them";
+    EXPECT_LE(iterate.control(2)[0], now + 0.2 + 1e-4);
+    one.limited->clear_limits();
+    EXPECT_EQ(solver->solve(iterate).status, Status::step_taken) << "and it goes on from there";
+  }
+}
+
 TEST(GnRtiLimits, GetsPastLinearisedLimitsThatContradictEachOther) {
   for (unsigned seed = 1; seed <= 8; ++seed) {
     Case one(seed, 0.1, infinity, 0.0);

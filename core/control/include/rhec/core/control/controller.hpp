@@ -130,6 +130,7 @@ class RHEC_EXPORT Controller {
   void start_cold() noexcept;
   void keep_within_bounds() noexcept;
   bool find_plan(Clock::time_point deadline) noexcept;
+  double plan_violation() noexcept;
   void measure_violations() noexcept;
   bool faces_away() const noexcept;
 
@@ -142,6 +143,8 @@ class RHEC_EXPORT Controller {
   std::shared_ptr<Solver> solver_;
   GuessShifter shifter_;
   Iterate point_;
+  Iterate relaxed_plan_;  ///< that violates hard limits least, while another one is looked for
+  Report relaxed_report_;
   Command command_;
   bool has_plan_ = false, prepared_ = false;
   bool is_finished_ = true;  ///< the last sample's plan was assessed and kept for the next one

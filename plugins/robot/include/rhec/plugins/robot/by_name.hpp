@@ -19,6 +19,15 @@ struct RHEC_EXPORT FiniteValue {
   std::string constraint() const { return NumberValue{range}.constraint(); }
 };
 
+/// A standard deviation: its square and that of its inverse are numbers, with room for what multiplies them; or 0, if
+/// the range has it.
+struct RHEC_EXPORT SigmaValue {
+  Range range;
+  double read(const Settings& from, const OptionContext& context) const;
+  std::string type() const { return NumberValue{range}.type(); }
+  std::string constraint() const { return NumberValue{range}.constraint(); }
+};
+
 /// [lower, upper] as written in a configuration; null stands for no bound.
 struct RHEC_EXPORT BoundsValue {
   std::pair<double, double> read(const Settings& from, const OptionContext& context) const;
@@ -96,5 +105,6 @@ class ByName {
 };
 
 using NumbersByName = ByName<FiniteValue>;
+using SigmasByName = ByName<SigmaValue>;
 
 }  // namespace rhec

@@ -46,8 +46,8 @@ class RHEC_EXPORT ControllerSection {
                                    std::shared_ptr<const SlipAhead> ahead = nullptr) const;
 
  private:
-  void add_problem(Controller::Setup& setup) const;
-  void add_blockings(Controller::Setup& setup) const;
+  void add_problem(Controller::Setup& setup, int intervals) const;
+  void add_blockings(Controller::Setup& setup, int intervals) const;
   void add_terms(Controller::Setup& setup) const;
 
   std::shared_ptr<const RobotContext> context_;

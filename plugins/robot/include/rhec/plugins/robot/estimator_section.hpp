@@ -61,6 +61,7 @@ class RHEC_EXPORT EstimatorSection {
 
  private:
   std::unique_ptr<SensorWatch> make_watch_for(const EstimatorMaker& maker, const EstimatorParts& parts) const;
+  void require_memory_for(const EstimatorMaker& maker) const;
   void add_states(const std::vector<double>& sigmas);
 
   EstimatorMakers makers_;
