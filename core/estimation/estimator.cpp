@@ -281,7 +281,10 @@ bool Estimator::judge_waiting(double until, Clock::time_point deadline) noexcept
         push_judged(watch_->held()[i].time, watch_->held()[i].outputs.measured());
       for (const double jump : watch_->jumps()) grid_.push_jump(jump, method_->reach());
     }
-    if (finding.retract) grid_.retract(watch_->retraction().from, watch_->retraction().outputs);
+    if (finding.retract) {
+      const SensorWatch::Retraction& wrong = watch_->retraction();
+      grid_.retract(wrong.jumps_from, wrong.outputs_from, wrong.outputs);
+    }
     bool is_complete = true;
     if (finding.rebase || !watch_->is_active()) is_complete = take_in(time, deadline);
     if (finding.rebase) {

@@ -101,12 +101,12 @@ void NodeGrid::push_jump(double time, int reach) noexcept {
   changed_ = std::min(changed_, begin);
 }
 
-void NodeGrid::retract(double time, const double* y) noexcept {
-  std::erase_if(jumps_, [&](double jump) { return jump >= time - setup_.tolerance; });
-  for (std::size_t row = measurements_.first_after(time + setup_.tolerance); row < measurements_.size(); ++row)
+void NodeGrid::retract(double jumps_from, double outputs_from, const double* y) noexcept {
+  std::erase_if(jumps_, [&](double jump) { return jump >= jumps_from - setup_.tolerance; });
+  for (std::size_t row = measurements_.first_after(outputs_from + setup_.tolerance); row < measurements_.size(); ++row)
     measurements_.remove(row, y);
-  const double begin = last_node_up_to(time);
-  changed_ = std::min(changed_, std::isnan(begin) ? time : begin);
+  const double begin = last_node_up_to(jumps_from);
+  changed_ = std::min(changed_, std::isnan(begin) ? jumps_from : begin);
 }
 
 int NodeGrid::outdated(double until, int reach) const noexcept {

@@ -28,7 +28,7 @@ constexpr double probable = 0.9;
 // Slip that has jumped within an interval displaces the vehicle by at least this share of it on the next one again.
 constexpr double goes_on_by = 0.8;
 // So many samples behind slip that was found to have jumped what is disputed may be the same that it was.
-constexpr int soon = 2;
+constexpr int soon = 1;
 // Slip that has changed within the gates has done so by this many samples ago.
 constexpr int changed_before[] = {3, 6};
 // A search that has not explained anything for so long begins anew.
@@ -151,7 +151,7 @@ bool SensorWatch::retract_slip() noexcept {
   const bool is_slip = slip_->is_active && memory.is_slip_possible;
   if (disputed_samples_ != 1 || is_slip || memory.since_release > soon || !is_position_disputed()) return false;
   int ago = 0;
-  while (ago < memory.connected && memory.entry(ago).time > memory.released_from) ++ago;
+  while (ago < memory.connected && memory.entry(ago).time > memory.released.outputs_from) ++ago;
   if (ago == memory.connected) return false;
   for (std::size_t s = 0; s < sensors_.size(); ++s)
     for (const int j : sensors_[s].outputs)
@@ -175,9 +175,7 @@ bool SensorWatch::retract_slip() noexcept {
   return true;
 }
 
-SensorWatch::Retraction SensorWatch::retraction() const noexcept {
-  return {memory_->released_from, memory_->retracted.data()};
-}
+SensorWatch::Retraction SensorWatch::retraction() const noexcept { return memory_->released; }
 
 std::span<const double> SensorWatch::jumps() const noexcept {
   return {memory_->jumps.data(), static_cast<std::size_t>(memory_->jump_count)};
@@ -320,7 +318,7 @@ void SensorWatch::note_followed() noexcept {
 SensorWatch::Finding SensorWatch::settle(double time, const double* outputs) noexcept {
   if (!is_disputed_) memory_->was_calm = std::min(calm_samples_, memory_->undisputed_samples) >= setup_.calm;
   is_disputed_ = true;
-  ++disputed_samples_;
+  if (++disputed_samples_ == 1) memory_->disputed_from = memory_->entry(0).time;
   for (std::size_t s = 0; s < sensors_.size() && disputed_samples_ == 1; ++s)
     for (const int j : sensors_[s].outputs)
       memory_->first_errors[j] =
@@ -351,7 +349,7 @@ SensorWatch::Finding SensorWatch::settle(double time, const double* outputs) noe
     const bool is_doubtful = slip_->explained < setup_.proof &&
                              std::ranges::none_of(records_, [](const Record& each) { return each.after_gap; });
     memory_->since_release = is_doubtful ? 0 : soon;
-    memory_->released_from = memory_->jumps[0];
+    memory_->released = {memory_->jumps[0], memory_->disputed_from, memory_->retracted.data()};
     accept(*slip_);
     for (Record& record : records_) record = {};
     acquit(outputs);

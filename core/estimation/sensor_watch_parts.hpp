@@ -87,7 +87,8 @@ struct SensorWatch::Memory {
   std::array<double, 2> jumps{};                        ///< behind which slip has been made anew for what is disputed
   int jump_count = 0;                                   ///< of these
   int since_release = std::numeric_limits<int>::max();  ///< samples since slip was found to have jumped
-  double released_from = unknown;                       ///< behind this time
+  double disputed_from = unknown;                       ///< behind this time what is disputed was measured
+  Retraction released{unknown, unknown, nullptr};       ///< what would have to be taken back of that
   std::vector<double> retracted;                        ///< n_y, not missing of outputs that were wrong then
   bool is_slip_possible = false;                        ///< slip that explains what is disputed is within its bounds
   StuckValues stuck;

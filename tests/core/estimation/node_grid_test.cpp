@@ -96,13 +96,13 @@ TEST(NodeGrid, TakesBackJumpsAndWhatWasMeasuredBehindThem) {
   EXPECT_EQ(outputs_of().size(), 12U);
   grid.push_jump(0.6, reach);
   const double first_output[] = {1.0, std::nan("")};
-  grid.retract(0.6, first_output);
+  grid.retract(0.4, 0.6, first_output);
   const std::vector<double> seen = outputs_of();
-  ASSERT_EQ(seen.size(), 6U) << "from the node at which it was";
-  EXPECT_EQ(seen[0], 3.0) << "measured there";
-  for (const std::size_t k : {2U, 4U}) EXPECT_TRUE(std::isnan(seen[k])) << k;
-  EXPECT_EQ(seen[3], 40.0);
-  EXPECT_EQ(seen[5], 50.0);
+  ASSERT_EQ(seen.size(), 8U) << "from the node on at which jumps are taken back";
+  for (const std::size_t k : {0U, 2U}) EXPECT_EQ(seen[k], 2.0 + 0.5 * static_cast<double>(k)) << "not behind 0.6 s";
+  for (const std::size_t k : {4U, 6U}) EXPECT_TRUE(std::isnan(seen[k])) << k;
+  EXPECT_EQ(seen[5], 40.0);
+  EXPECT_EQ(seen[7], 50.0);
 }
 
 }  // namespace node_grid_test

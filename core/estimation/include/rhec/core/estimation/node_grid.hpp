@@ -42,9 +42,9 @@ class RHEC_EXPORT NodeGrid {
   /// The parameters have jumped soon after a time: at the last node up to there. Nothing happens if that is out of
   /// reach.
   void push_jump(double time, int reach) noexcept;
-  /// Takes back the jumps from a time on, and what was measured behind it of the outputs that are not missing in y
-  /// (n_y).
-  void retract(double time, const double* y) noexcept;
+  /// Takes back the jumps from a time on, and what was measured behind another, not earlier one of the outputs that
+  /// are not missing in y (n_y).
+  void retract(double jumps_from, double outputs_from, const double* y) noexcept;
 
   /// How many of the newest nodes have to be taken back, at most `reach`, for what is stamped up to a time.
   int outdated(double until, int reach) const noexcept;

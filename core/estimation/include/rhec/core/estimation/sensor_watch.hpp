@@ -74,8 +74,8 @@ class RHEC_EXPORT SensorWatch {
   /// Times of samples behind which slip has jumped; after `judge` has said so.
   std::span<const double> jumps() const noexcept;
   struct Retraction {
-    double from;            ///< behind this time [s]
-    const double* outputs;  ///< those that are not missing here (n_y) were wrong
+    double jumps_from, outputs_from;  ///< behind these times [s]
+    const double* outputs;            ///< those that are not missing here (n_y) were wrong
   };
   Retraction retraction() const noexcept;
   const Eigen::VectorXd& mean() const noexcept;
