@@ -144,7 +144,7 @@ void limit_memory() {
   struct rlimit limit {};
   if (!(statm >> total >> resident >> shared >> text >> libraries >> data) || getrlimit(RLIMIT_DATA, &limit) != 0)
     return;
-  const double most = data * static_cast<double>(sysconf(_SC_PAGESIZE)) + rhec::free_memory();
+  const double most = data * static_cast<double>(getpagesize()) + rhec::free_memory();
   if (!(most < static_cast<double>(limit.rlim_cur))) return;
   limit.rlim_cur = static_cast<rlim_t>(most);
   setrlimit(RLIMIT_DATA, &limit);

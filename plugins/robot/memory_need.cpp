@@ -1,7 +1,7 @@
 #include "rhec/plugins/robot/memory_need.hpp"
 
 #include <sys/resource.h>
-#ifdef __GLIBC__
+#ifdef RHEC_HAS_MALLINFO2
 #include <malloc.h>
 #endif
 
@@ -36,7 +36,7 @@ constexpr int most_few = 32, least_few = 2;
 
 /// What the process holds of the heap [bytes]; 0 where the allocator does not tell (as a sanitizer's).
 double allocated() {
-#ifdef __GLIBC__
+#ifdef RHEC_HAS_MALLINFO2
   const struct mallinfo2 now = mallinfo2();
   return static_cast<double>(now.uordblks) + static_cast<double>(now.hblkhd);
 #else
@@ -84,10 +84,10 @@ double left_by_groups() {
 }
 
 /// Of a limit of the process, of which it uses what /proc/self/status says.
-double left_of(int resource, const char* used_name) {
+template <class Resource>
+double left_of(Resource resource, const char* used_name) {
   struct rlimit limit {};
-  if (getrlimit(static_cast<__rlimit_resource_t>(resource), &limit) != 0 || limit.rlim_cur == RLIM_INFINITY)
-    return infinity;
+  if (getrlimit(resource, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY) return infinity;
   const double used = kibibytes_of("/proc/self/status", used_name).value_or(0.0);
   return std::max(0.0, static_cast<double>(limit.rlim_cur) - used);
 }

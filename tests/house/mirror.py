@@ -69,7 +69,6 @@ UNTESTED = {
     "sim/telemetry/track_mcap.cpp": "tests/sim/telemetry/track_writer_test.cpp: messages have what the run had",
     "plugins/host/examiner_process.cpp": "tests/plugins/host/examine_test.cpp: runs it; examiner_test.cpp has how it may end",
     "core/estimation/kalman_filter_between.cpp": "tests/core/estimation/between_nodes_test.cpp: against dense conditioning",
-    "core/estimation/node_grid.cpp": "tests/core/estimation/estimator_test.cpp: every rule of where nodes lie",
     "core/estimation/prior_bank_between.cpp": "tests/core/estimation/between_nodes_test.cpp: against a window's problem",
     "core/estimation/stamped_rows.cpp": "tests/core/estimation/estimator_test.cpp: order, equal stamps, and what is full",
     "core/horizon/measured_interval.cpp": "tests/core/horizon/rhe_between_test.cpp: whatever a problem has between nodes",

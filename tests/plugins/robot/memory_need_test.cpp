@@ -62,7 +62,7 @@ class LittleMemory {
   static double free_below(rlim_t limit) {
     double total = 0, resident = 0, shared = 0, text = 0, libraries = 0, data = 0;
     std::ifstream("/proc/self/statm") >> total >> resident >> shared >> text >> libraries >> data;
-    return static_cast<double>(limit) - data * static_cast<double>(sysconf(_SC_PAGESIZE));
+    return static_cast<double>(limit) - data * static_cast<double>(getpagesize());
   }
   struct rlimit before_ {};
 };
