@@ -35,9 +35,8 @@ const char* advice_for(Status status) noexcept {
     case Status::step_taken:
       return "One real-time iteration was taken; use mode: converge where full accuracy is needed.";
     case Status::relaxed:
-      return "Hard limits could not be kept around the last plan, and were violated least; soft ones, or more room, "
-             "leave "
-             "a choice.";
+      return "Hard limits could not be kept around the last plan, and were violated least; soft ones or more room "
+             "leave a choice.";
     case Status::iteration_limit:
       return "Raise max_iterations, give a better initial guess, or loosen the tolerance.";
     case Status::deadline:
