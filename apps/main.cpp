@@ -165,8 +165,7 @@ int run_and_tell(int count, char** words) {
   } catch (const std::bad_alloc&) {
     std::fputs(
         "rhec: error: there is not enough memory; expected shorter horizons and logs, coarser grids and maps, or a "
-        "machine "
-        "with more\n",
+        "machine with more\n",
         stderr);  // which needs none
   } catch (const std::exception& failure) {
     fmt::print(stderr, "rhec: error: failed unexpectedly: {}\n", failure.what());

@@ -282,7 +282,7 @@ bool Estimator::judge_waiting(double until, Clock::time_point deadline) noexcept
       for (const double jump : watch_->jumps()) grid_.push_jump(jump, method_->reach());
     }
     if (finding.retract) {
-      const SensorWatch::Retraction& wrong = watch_->retraction();
+      const SensorWatch::Retraction wrong = watch_->retraction();
       grid_.retract(wrong.jumps_from, wrong.outputs_from, wrong.outputs);
     }
     bool is_complete = true;

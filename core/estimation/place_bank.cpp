@@ -79,7 +79,8 @@ void PlaceBank::take_node(const BankHistory::Node& before, const BankHistory::No
     probability_ = stays + begins;
     bank_.take_share(begins / probability_, before.mean, before.covariance);
   }
-  bank_.predict(node.between->over(node.way.duration, node.inputs, node.way.ends_with_jump), node.outputs);
+  // Without jumps: of slip that jumps the map says what it is behind it.
+  bank_.predict(node.between->over(node.way.duration, node.inputs), node.outputs);
   knows_ = bank_.knows_place();
   if (!knows_) return;
   bank_.update(node.outputs, node.robust_weights);

@@ -55,7 +55,7 @@ std::size_t MeasuredRows::insert(double time, Measured measured) noexcept {
 
 void MeasuredRows::remove(std::size_t i, const double* y) noexcept {
   for (int j = 0; j < outputs_; ++j)
-    if (!std::isnan(y[j])) values(i)[j] = std::numeric_limits<double>::quiet_NaN();
+    if (!std::isnan(y[j])) row(i)[j] = std::numeric_limits<double>::quiet_NaN();
 }
 
 }  // namespace rhec

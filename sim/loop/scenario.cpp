@@ -490,8 +490,7 @@ std::vector<std::string> Scenario::notes() const {
   if (path_.duration() > slow_usual * usual_time)
     notes.push_back(
         fmt::format("path: {:.4g} m take {:.3g} s, {:.3g} steps, and at {:g} m/s they would take {:.3g} s; the speeds "
-                    "of waypoints, "
-                    "path.lateral_acceleration or path.acceleration lower the speed so much",
+                    "of waypoints, path.lateral_acceleration or path.acceleration lower the speed so much",
                     path_.length(), path_.duration(), path_.duration() / options_.step, options_.speed, usual_time));
   const double acceleration = exceeded_along(
       path_, [](const PathPoint& point) { return point.speed * point.speed * std::abs(point.curvature); });

@@ -19,9 +19,7 @@ struct SensorWatchSetup {
   int slip_proof = 2;                    ///< samples that a jump of slip must explain
   int gap_proof = 3;                     ///< like `proof`, of a sensor that had said nothing for some time
   int calm = 5;                          ///< samples without a finding after which health is ok again
-  /// The same of a sensor that the estimate has followed: one that comes back as a transient does is then still
-  /// doubted.
-  int calm_after_moving = 10;
+  int calm_after_moving = 10;  ///< the same of a sensor that was followed: a transient that ends is still doubted
   bool offsets = true;         ///< whether sensors that are off by little for long are found and corrected
   double lost_position = 3.0;  ///< standard deviation above which the vehicle is lost [m]
   double lost_heading = 0.5;   ///< likewise [rad]

@@ -23,9 +23,11 @@ class RHEC_EXPORT StampedRows {
   const double* values(std::size_t i) const noexcept { return values_.data() + (first_ + i) * width_; }
   /// The first row behind a time; `size()` if there is none.
   std::size_t first_after(double time) const noexcept;
-  double* values(std::size_t i) noexcept { return values_.data() + (first_ + i) * width_; }
   void drop_front(std::size_t rows) noexcept;
   void clear() noexcept { first_ = count_ = 0; }
+
+ protected:
+  double* row(std::size_t i) noexcept { return values_.data() + (first_ + i) * width_; }
 
  private:
   std::size_t capacity_, width_, first_ = 0, count_ = 0;
