@@ -93,11 +93,11 @@ double variance_off_course(const Prior& prior, double duration, double distance)
   return std::isfinite(halfway) ? 4.0 * std::max(halfway, 0.0) : 0.0;
 }
 
-/// F and Q of a process over a way. Where it ends with a jump, the value has the variance of its start there besides;
-/// its level and its derivatives stay.
-void advance(const Prior& prior, double way, bool ends_with_jump, double* F, double* Q) noexcept {
-  prior.advance(way, F, Q);
-  if (!ends_with_jump) return;
+/// F and Q of a process over an interval. Where that ends with a jump, the value has the variance of its start there
+/// besides; its level and its derivatives stay.
+void advance(const Prior& prior, const ProcessInterval& way, double* F, double* Q) noexcept {
+  prior.advance(prior.along() == Along::time ? way.duration : way.distance, F, Q);
+  if (!way.ends_with_jump) return;
   std::array<double, Prior::max_states> mean;
   std::array<double, std::size_t{Prior::max_states} * Prior::max_states> covariance;
   prior.start(mean.data(), covariance.data());
@@ -105,8 +105,8 @@ void advance(const Prior& prior, double way, bool ends_with_jump, double* F, dou
 }
 
 /// Up to a jump a parameter is held.
-bool is_ramp(const Prior& prior, bool ends_with_jump) noexcept {
-  return prior.course() == Course::ramp && !ends_with_jump;
+bool is_ramp(const Prior& prior, const ProcessInterval& way) noexcept {
+  return prior.course() == Course::ramp && !way.ends_with_jump;
 }
 
 }  // namespace
@@ -480,19 +480,18 @@ void PriorBank::find_distance(const double* input, double duration) noexcept {
 }
 
 /// F and Q of every process over the interval.
-void PriorBank::advance_processes(double duration, bool ends_with_jump) noexcept {
+void PriorBank::advance_processes(const ProcessInterval& way) noexcept {
   for (Process& process : processes_) {
     for (std::size_t kind = 0; kind < process.kinds.size(); ++kind) {
       const Prior& prior = *process.kinds[kind];
-      advance(prior, prior.along() == Along::time ? duration : distance_, ends_with_jump, own_.data(),
-              own_covariance_.data());
+      advance(prior, way, own_.data(), own_covariance_.data());
       const Filling filling{prior, process.place, process.filler, process.count};
       filling.transition(own_.data(), filled_.data());
       filling.covariance(own_covariance_.data(), filled_covariance_.data());
-      const double off_course = ahead_ && members_ > 1 ? variance_off_course(prior, duration, distance_) : 0.0;
+      const double off_course = ahead_ && members_ > 1 ? variance_off_course(prior, way.duration, way.distance) : 0.0;
       for (int m = 0; m < lanes_; ++m) {
         if (process.kind_of[std::min(m, members_ - 1)] != static_cast<int>(kind)) continue;
-        process.ramp[m] = is_ramp(prior, ends_with_jump) ? 1.0 : 0.0;
+        process.ramp[m] = is_ramp(prior, way) ? 1.0 : 0.0;
         if (ahead_) process.off_course[m] = off_course;
         for (int e = 0; e < process.count * process.count; ++e) {
           process.F[e * lanes_ + m] = filled_[e];
@@ -527,7 +526,7 @@ void PriorBank::begin_step(const MeasuredInterval& interval) noexcept {
   }
   between_log_likelihood_ = 0.0;
   find_distance(input_.data(), interval.duration);
-  advance_processes(interval.duration, interval.ends_with_jump);
+  advance_processes({interval.duration, distance_, interval.ends_with_jump});
   if (setup_.map) follow_map();
   if (members_ > 1) mix_members();
 }
@@ -645,11 +644,10 @@ void PriorBank::write_process(int member, int parameter, const ProcessInterval& 
   const int count = processes_[parameter].count;
   std::array<int, Prior::max_states> places{};
   const int own = own_places(member, parameter, places.data());
-  advance(prior, prior.along() == Along::time ? way.duration : way.distance, way.ends_with_jump, own_.data(),
-          own_covariance_.data());
+  advance(prior, way, own_.data(), own_covariance_.data());
   double *F = data + 1, *L = F + count * count;
   std::fill_n(data, 1 + 2 * count * count, 0.0);
-  data[0] = is_ramp(prior, way.ends_with_jump) ? 1.0 : 0.0;
+  data[0] = is_ramp(prior, way) ? 1.0 : 0.0;
   // The Cholesky factor of a covariance that may be singular: what no pivot is left for is determined by those before.
   for (int c = 0; c < own; ++c) {
     const auto at = [&](int r, int k) -> double& { return L[places[k] * count + places[r]]; };

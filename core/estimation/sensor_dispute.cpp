@@ -34,10 +34,6 @@ constexpr int changed_before[] = {3, 6};
 // A search that has not explained anything for so long begins anew.
 constexpr int stale = 3;
 
-void make_slip_anew(WalkingFilter& filter, const std::vector<double>& sigmas) noexcept {
-  for (std::size_t j = 0; j < sigmas.size(); ++j) filter.restart_parameter(static_cast<int>(j), sigmas[j]);
-}
-
 void go_on_from(const WalkingFilter& from, WalkingFilter& filter) noexcept {
   filter.mean() = from.mean();
   filter.covariance() = from.covariance();
@@ -51,7 +47,7 @@ void SensorWatch::start(Hypothesis& hypothesis) noexcept {
   hypothesis.filter.mean() = memory_->before_mean;
   hypothesis.filter.covariance() = memory_->before_covariance;
   if (&hypothesis == slip_.get()) {
-    make_slip_anew(slip_->filter, setup_.parameter_sigmas);
+    slip_->filter.restart_parameters(setup_.parameter_sigmas);
     slip_->filter.predict(input_.data(), memory_->duration);
   } else {
     blind_->filter.predict(believed_input_.data(), memory_->duration);
@@ -104,7 +100,7 @@ void SensorWatch::begin_edge(bool is_new) noexcept {
   edge_->is_active = is_new && slip_->is_active;
   if (!edge_->is_active) return;
   go_on_from(slip_->filter, edge_->filter);
-  make_slip_anew(edge_->filter, setup_.parameter_sigmas);
+  edge_->filter.restart_parameters(setup_.parameter_sigmas);
 }
 
 /// Whether slip that explains the first sample of a dispute, and not the second, has jumped within the interval before
@@ -245,7 +241,7 @@ bool SensorWatch::consider_slip_before() noexcept {
     WalkingFilter& filter = slip_->filter;
     filter.mean() = entry(back).mean;
     filter.covariance() = entry(back).covariance;
-    make_slip_anew(filter, setup_.parameter_sigmas);
+    filter.restart_parameters(setup_.parameter_sigmas);
     for (int ago = back; ago > 0; --ago) {
       filter.predict(entry(ago).inputs.data(), entry(ago - 1).time - entry(ago).time);
       filter.update(entry(ago - 1).outputs.measured());
@@ -370,7 +366,7 @@ SensorWatch::Finding SensorWatch::settle(double time, const double* outputs) noe
     // Nothing explains what is measured: the position counts, and all else is found anew.
     start_moved();
     moved_->filter.update(weighed(raw_.data()));
-    make_slip_anew(moved_->filter, setup_.parameter_sigmas);
+    moved_->filter.restart_parameters(setup_.parameter_sigmas);
     search_from(moved_->filter, *memory_->search);
     memory_->places.clear();
     for (Record& record : records_) record = {};

@@ -132,8 +132,7 @@ bool SensorWatch::changes_slip(Hypothesis& each) noexcept {
   WalkingFilter& trial = *memory_->trial;
   trial.mean() = each.before_mean;
   trial.covariance() = each.before_covariance;
-  for (std::size_t j = 0; j < setup_.parameter_sigmas.size(); ++j)
-    trial.restart_parameter(static_cast<int>(j), setup_.parameter_sigmas[j]);
+  trial.restart_parameters(setup_.parameter_sigmas);
   trial.predict(input_.data(), memory_->duration);
   if (!fits(trial, raw_.data())) return false;
   copy_numbers(trial.mean(), memory_->before_slip);

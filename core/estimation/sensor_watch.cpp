@@ -355,8 +355,7 @@ SensorWatch::Finding SensorWatch::judge(double time, double* outputs, const doub
         // Of a vehicle that heads elsewhere measurements ask for slip that cannot be, again and again.
         memory_->impossible_samples = 0;
         beyond = 0.0;
-        for (std::size_t j = 0; j < setup_.parameter_sigmas.size(); ++j)
-          filter.restart_parameter(static_cast<int>(j), setup_.parameter_sigmas[j]);
+        filter.restart_parameters(setup_.parameter_sigmas);
         search_from(filter, *memory_->search);
         memory_->offsets->forget_onsets();
         end_dispute();

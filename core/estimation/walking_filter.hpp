@@ -42,7 +42,11 @@ class WalkingFilter {
   /// How the last update has used an output.
   KalmanFilter::Use use(int output) const noexcept { return filter_.use(output); }
   /// Makes a parameter anew: its mean stays, with this standard deviation.
-  void restart_parameter(int parameter, double sigma) noexcept { filter_.restart_parameter(parameter, sigma * sigma); }
+  /// Nothing is known of the parameters but these standard deviations (n_p).
+  void restart_parameters(const std::vector<double>& sigmas) noexcept {
+    for (std::size_t j = 0; j < sigmas.size(); ++j)
+      filter_.restart_parameter(static_cast<int>(j), sigmas[j] * sigmas[j]);
+  }
 
   /// Expected outputs and their derivatives, for `innovation`.
   void expect() noexcept;

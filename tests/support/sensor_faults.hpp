@@ -48,18 +48,26 @@ struct SensorFaults : ::testing::TestWithParam<const char*> {
   static constexpr int seeds = 4;
   static constexpr double usual_error = 0.3;  // [m]
 
-  /// Holds what every fault has to keep, and hands on the episodes.
+  /// Holds what every fault has to keep but for honesty, as of one that is followed to a wrong place for long, and
+  /// hands on the episodes.
   template <class Function>
-  void expect_each(const Fault& fault, const Function& check) {
+  void expect_each_long(const Fault& fault, const Function& check) {
     for (int seed = 1; seed <= seeds; ++seed) {
       SCOPED_TRACE(seed);
       const Episode episode = drive_with_fault(vehicle, fault, static_cast<std::uint64_t>(seed));
       EXPECT_TRUE(episode.is_finite);
-      EXPECT_GE(episode.honest_share(), 0.95);
       for (const Episode::Sample& sample : episode.before) EXPECT_EQ(sample.health, HealthLevel::ok) << sample.words;
       EXPECT_LE(episode.samples_to_ok(), 25);
       check(episode);
     }
+  }
+  /// Holds all of it.
+  template <class Function>
+  void expect_each(const Fault& fault, const Function& check) {
+    expect_each_long(fault, [&](const Episode& episode) {
+      EXPECT_GE(episode.honest_share(), 0.95);
+      check(episode);
+    });
   }
 };
 

@@ -17,19 +17,7 @@ namespace sensor_return_test {
 using namespace rhec::testing;
 using ::testing::HasSubstr;
 
-struct SensorReturns : SensorFaults {
-  /// The same of one that is followed to a wrong place for long, which cannot be honest.
-  template <class Function>
-  void expect_each_long(const Fault& fault, const Function& check) {
-    for (int seed = 1; seed <= seeds; ++seed) {
-      SCOPED_TRACE(seed);
-      const Episode episode = drive_with_fault(vehicle, fault, static_cast<std::uint64_t>(seed));
-      EXPECT_TRUE(episode.is_finite);
-      EXPECT_LE(episode.samples_to_ok(), 25);
-      check(episode);
-    }
-  }
-};
+struct SensorReturns : SensorFaults {};
 INSTANTIATE_TEST_SUITE_P(All, SensorReturns, ::testing::Values("ekf", "bank", "rhe"), name_of_estimator);
 
 constexpr int followed = 12;  // samples after which a position that has moved is followed for sure

@@ -143,7 +143,7 @@ class RHEC_EXPORT PriorBank {
   int plain_count() const noexcept { return 2 * n_ - nx_ + nu_; }  ///< of the wide vector, without the factors f
   int wide_count() const noexcept;
   void find_distance(const double* input, double duration) noexcept;
-  void advance_processes(double duration, bool ends_with_jump) noexcept;
+  void advance_processes(const ProcessInterval& way) noexcept;
   void mix_members() noexcept;
   void find_loss_scales();
   void weigh_outputs(const Frame& frame, const double* y, int taken, const double* given) noexcept;
