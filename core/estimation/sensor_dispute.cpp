@@ -11,8 +11,6 @@ namespace rhec {
 
 namespace {
 
-// Samples of a dispute after which a position may have been wrong before, when another sensor seemed to be.
-constexpr int suspect_position = 4;
 // In typical magnitudes, how far off a state can be that a sensor sees after it has moved.
 constexpr double displacement = 100.0;
 // Samples in a row that measured inputs must fit before they are believed again.
@@ -29,7 +27,7 @@ constexpr double probable = 0.9;
 constexpr double goes_on_by = 0.8;
 // So many samples behind slip that was found to have jumped what is disputed may be the same that it was.
 constexpr int soon = 1;
-// Slip that has changed within the gates has done so by this many samples ago.
+// Slip that has changed within the gates has done so by this many measured positions ago.
 constexpr int changed_before[] = {3, 6};
 // A search that has not explained anything for so long begins anew.
 constexpr int stale = 3;
@@ -236,8 +234,9 @@ bool SensorWatch::consider_slip_before() noexcept {
   // After a gap there is little to be used anew.
   if (std::ranges::any_of(records_, [](const Record& each) { return each.after_gap; })) return false;
   const auto entry = [this](int ago) -> const Memory::Entry& { return memory_->entry(ago); };
-  for (const int back : changed_before) {
-    if (back >= memory_->connected) return false;
+  for (const int positions : changed_before) {
+    const int back = memory_->samples_with_positions(positions);
+    if (back == 0) return false;
     WalkingFilter& filter = slip_->filter;
     filter.mean() = entry(back).mean;
     filter.covariance() = entry(back).covariance;
@@ -247,7 +246,7 @@ bool SensorWatch::consider_slip_before() noexcept {
       filter.update(entry(ago - 1).outputs.measured());
     }
     filter.predict(input_.data(), memory_->duration);
-    if (!is_within_bounds(filter) || !fits(filter, raw_.data())) continue;
+    if (!is_within_bounds(filter.mean()) || !fits(filter, raw_.data())) continue;
     memory_->jumps[0] = entry(back).time;
     return true;
   }
@@ -320,6 +319,7 @@ SensorWatch::Finding SensorWatch::settle(double time, const double* outputs) noe
       memory_->first_errors[j] =
           (findings_[s] & reason::rejected) && sees_position(j) ? raw_[j] - own_->filter.expected(j) : Memory::unknown;
   if (disputed_samples_ == suspect_position && is_position_disputed() && memory_->offsets->has_recent()) {
+    if (Finding finding; consider_other(outputs, finding)) return finding;
     // A position that jumps may have drifted before, and what seemed to be off was right.
     memory_->offsets->withdraw_recent(own_->filter);
     own_->filter.update(weighed(outputs));
@@ -327,6 +327,7 @@ SensorWatch::Finding SensorWatch::settle(double time, const double* outputs) noe
   }
   const double likelihood_of_new_slip = consider_slip();
   const bool retracts = retract_slip();
+  if (Finding finding; !retracts && consider_other(outputs, finding)) return finding;
   consider_return(time);
   consider_moved(likelihood_of_new_slip);
   think_again();
@@ -337,8 +338,9 @@ SensorWatch::Finding SensorWatch::settle(double time, const double* outputs) noe
   // Slip that has jumped shows from the first sample on. Later the filter without the sensor knows so little that new
   // slip explains nearly anything.
   const bool has_begun_with_it = disputed_samples_ - slip_->explained < fresh;
-  // Slip that would have to leave its bounds for what a compass says explains nothing of it.
-  const bool may_be_slip = is_position_disputed() || is_within_bounds(slip_->filter);
+  // Slip that would have to leave its bounds for what a compass says explains nothing of it, nor does slip that jumps
+  // once the compass has been wrong already.
+  const bool may_be_slip = is_position_disputed() || (has_begun_with_it && is_within_bounds(slip_->filter.mean()));
   if (has_come_back()) return come_back();
   if (may_be_slip && slip_->explained >= (has_begun_with_it ? setup_.slip_proof : setup_.proof)) {
     // What has explained much, or follows a gap, is not doubted for what comes next.
@@ -383,11 +385,11 @@ SensorWatch::Finding SensorWatch::settle(double time, const double* outputs) noe
   return {.retract = retracts};
 }
 
-bool SensorWatch::is_within_bounds(const WalkingFilter& filter) const noexcept {
-  const Eigen::Index nx = filter.model().state_count();
+bool SensorWatch::is_within_bounds(const Eigen::VectorXd& mean) const noexcept {
+  const Eigen::Index nx = own_->filter.model().state_count();
   bool is_within = true;
   for (std::size_t j = 0; j < setup_.walk.size(); ++j) {
-    const double slip = filter.mean()[nx + static_cast<Eigen::Index>(j)];
+    const double slip = mean[nx + static_cast<Eigen::Index>(j)];
     is_within = is_within && slip > setup_.noise.parameter_lower[j] && slip < setup_.noise.parameter_upper[j];
   }
   return is_within;
@@ -397,14 +399,14 @@ bool SensorWatch::is_within_bounds(const WalkingFilter& filter) const noexcept {
 /// has the covariance of both answers, so that it agrees with what the sensors say: nothing is wrong with it.
 bool SensorWatch::is_probably_slip() const noexcept {
   return is_disputed_ && disputed_samples_ <= fresh && slip_->is_active && slip_probability_ > probable &&
-         memory_->was_calm && memory_->is_slip_possible && is_within_bounds(own_->filter) &&
+         memory_->was_calm && memory_->is_slip_possible && is_within_bounds(own_->filter.mean()) &&
          (input_findings_ | inputs_.reasons) == 0;
 }
 
 /// What was held back, and what was rejected last, is right after all.
 void SensorWatch::acquit(const double* outputs) noexcept {
   // Slip at a bound may well be beyond it, as that of wheels that spin on the spot.
-  const bool is_doubtful = !memory_->was_calm || !is_within_bounds(own_->filter);
+  const bool is_doubtful = !memory_->was_calm || !is_within_bounds(own_->filter.mean());
   const auto take_back = [&](auto&& was_rejected) {
     for (std::size_t s = 0; s < sensors_.size(); ++s) {
       if (std::ranges::none_of(sensors_[s].outputs, was_rejected)) continue;

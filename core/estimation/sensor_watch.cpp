@@ -18,8 +18,8 @@ namespace {
 constexpr std::size_t innovation_capacity = 256, held_capacity = 32;
 // In typical magnitudes, what a measured input cannot be.
 constexpr double impossible_input = 20.0;
-// After so many failures in a row a sensor is suspect: it then has to pass a closer gate, so many times in a row.
-constexpr int suspect_after = 3, passes_of_suspects = 2;
+// A suspect sensor has to pass so many times in a row.
+constexpr int passes_of_suspects = 2;
 // The same of one that is not followed when it moves.
 constexpr int passes_of_kept_out = 5;
 constexpr double close_gate = 3.0;
@@ -27,8 +27,6 @@ constexpr double close_gate = 3.0;
 constexpr double error_memory = 5.0;
 // By so much less nu' S^-1 nu is a measurement much nearer to no error than to that one.
 constexpr double much_nearer = 9.0;
-// Silence after which a sensor that disagrees is more likely right than the estimate [s].
-constexpr double longest_gap = 1.0;
 // A real receiver's errors may be far larger than its noise says, and not Gaussian at all: its gate is as much wider as
 // its squared innovations have been over some five hundred samples, of which none counts more than this many times what
 // was expected, and those of one that is suspect not at all.
@@ -133,8 +131,9 @@ SensorWatch::SensorWatch(std::shared_ptr<const Model> model, const Setup& setup)
     entry.mean = memory_->before_mean;
     entry.covariance = memory_->before_covariance;
     entry.inputs.assign(model->input_count(), 0.0);
-    entry.outputs = MeasuredOutputs(model->output_count());
+    entry.outputs = entry.rejected = MeasuredOutputs(model->output_count());
   }
+  memory_->replayed = memory_->entries[0].outputs;
   raw_.assign(model->output_count(), Memory::unknown);
   memory_->first_errors = memory_->retracted = raw_;
   input_.assign(model->input_count(), 0.0);
@@ -405,7 +404,7 @@ SensorWatch::Finding SensorWatch::judge(double time, double* outputs, const doub
 bool SensorWatch::admits(std::size_t sensor, const Innovation& innovation) noexcept {
   Record& record = records_[sensor];
   // What it was before a gap, as while it was stuck, says nothing of it afterwards.
-  const bool comes_back = innovation.time - heard_[sensor] > longest_gap;
+  const bool comes_back = innovation.time - heard_[sensor] > Memory::longest_gap;
   if (comes_back) record = {};
   const bool is_suspect = record.failures >= suspect_after;
   const auto degrees = static_cast<double>(innovation.value.size());
@@ -543,6 +542,15 @@ void SensorWatch::remember(double time, const double* outputs) noexcept {
   copy_numbers(own_->filter.mean(), entry.mean);
   copy_numbers(own_->filter.covariance(), entry.covariance);
   entry.outputs.assign(weighed(outputs));
+  entry.rejected.assign(weighed(raw_.data()));
+  entry.rejected.remove(outputs);
+  entry.has_position = false;
+  for (std::size_t j = 0; j < raw_.size(); ++j) {
+    if (!sees_position(static_cast<int>(j)))
+      entry.rejected.values()[j] = Memory::unknown;
+    else
+      entry.has_position = entry.has_position || !std::isnan(raw_[j]);
+  }
 }
 
 }  // namespace rhec

@@ -24,6 +24,11 @@
 
 namespace rhec {
 
+// After so many failures in a row a sensor is suspect: it then has to pass a closer gate, and more than once.
+inline constexpr int suspect_after = 3;
+// Samples of a dispute after which a position may have been wrong before, when another sensor seemed to be.
+inline constexpr int suspect_position = 4;
+
 /// A filter, and how long what it assumes has explained the measurements.
 struct SensorWatch::Hypothesis {
   WalkingFilter filter;
@@ -52,7 +57,9 @@ struct SensorWatch::Hypothesis {
 /// What was known after the last samples, and the motion since then.
 struct SensorWatch::Memory {
   static constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
-  static constexpr std::size_t remembered_samples = 64;
+  static constexpr std::size_t remembered_samples = 128;
+  // Silence after which a sensor that disagrees is more likely right than the estimate [s].
+  static constexpr double longest_gap = 1.0;
   // A heading that is less certain is still being searched [rad].
   static constexpr double known_heading = 0.35;
   // Disputes longer than this many times the proof mean that nothing explains the sensors.
@@ -68,11 +75,28 @@ struct SensorWatch::Memory {
     Eigen::MatrixXd covariance;
     std::vector<double> inputs;  ///< until the next one
     MeasuredOutputs outputs;     ///< that were used
+    MeasuredOutputs rejected;    ///< positions that were not
+    bool has_position = false;   ///< of either kind
   };
   std::vector<Entry> entries{remembered_samples};
   std::size_t newest = 0;
   Entry& entry(int ago) noexcept {
     return entries[(newest + entries.size() - static_cast<std::size_t>(ago)) % entries.size()];
+  }
+  /// How many of the newest samples it takes to have so many positions, used or rejected, and what was known before; 0:
+  /// so many are not remembered.
+  int samples_with_positions(int positions) noexcept {
+    for (int ago = 1; ago < std::min<std::int64_t>(connected, remembered_samples); ++ago) {
+      positions -= entry(ago - 1).has_position;
+      if (positions == 0) return ago;
+    }
+    return 0;
+  }
+  /// Whether nothing was measured for long within so many samples.
+  bool has_gap(int samples) noexcept {
+    for (int ago = samples; ago > 0; --ago)
+      if (entry(ago - 1).time - entry(ago).time > longest_gap) return true;
+    return false;
   }
   std::int64_t count = 0;
   std::int64_t connected = 0;  ///< of the newest, by what moves and by what is measured
@@ -90,6 +114,7 @@ struct SensorWatch::Memory {
   double disputed_from = unknown;                       ///< behind this time what is disputed was measured
   Retraction released{unknown, unknown, nullptr};       ///< what would have to be taken back of that
   std::vector<double> retracted;                        ///< n_y, not missing of outputs that were wrong then
+  MeasuredOutputs replayed;                             ///< what counts of a sample that is replayed
   bool is_slip_possible = false;                        ///< slip that explains what is disputed is within its bounds
   StuckValues stuck;
   std::unique_ptr<OffsetWatch> offsets;

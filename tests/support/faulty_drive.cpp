@@ -30,23 +30,22 @@ class Truth {
   }
   void advance(double speed, double fallen) {
     const ModelDescription& about = model_.description();
-    for (std::size_t j = 0; j < parameters_.size(); ++j)
-      parameters_[j] = 0.75 + 0.15 * std::sin(distance_ / 9.0 + static_cast<double>(j));
-    parameters_[0] -= fallen;
-    for (std::size_t j = 0; j < inputs.size(); ++j) {
-      if (static_cast<int>(j) == about.roles.speed) {
-        inputs[j] = speed;
-        continue;
-      }
-      const double wanted = 0.3 * std::sin(0.3 * time_ + phase_);
-      inputs[j] = std::clamp(wanted - state[model_.state_count() - 1], -0.5, 0.5);
+    const bool is_steered = about.roles.speed >= 0;
+    for (std::size_t j = 0; j < parameters_.size(); ++j) {
+      const double wave = std::sin(distance_ / 9.0 + static_cast<double>(j));
+      parameters_[j] = is_steered ? 0.75 + 0.15 * wave : 0.1 + 0.05 * wave;
     }
+    parameters_[0] -= fallen;
+    if (is_steered)
+      steer(speed);
+    else
+      turn(speed);
     constexpr int parts = 20;
     for (int i = 0; i < parts; ++i) {
       model_.rates(state.data(), inputs.data(), parameters_.data(), slopes_.data());
       for (Eigen::Index j = 0; j < state.size(); ++j) state[j] += slopes_[static_cast<std::size_t>(j)] * step_ / parts;
     }
-    distance_ += speed * parameters_[0] * step_;
+    distance_ += is_steered ? speed * parameters_[0] * step_ : speed * step_;
     time_ += step_;
   }
   double slip() const { return parameters_[0]; }  ///< of the last interval
@@ -54,6 +53,22 @@ class Truth {
   std::vector<double> inputs;
 
  private:
+  void steer(double speed) {
+    const int driven = model_.description().roles.speed;
+    for (std::size_t j = 0; j < inputs.size(); ++j) {
+      const double wanted = 0.3 * std::sin(0.3 * time_ + phase_);
+      inputs[j] =
+          static_cast<int>(j) == driven ? speed : std::clamp(wanted - state[model_.state_count() - 1], -0.5, 0.5);
+    }
+  }
+  /// By the wheels of its sides.
+  void turn(double speed) {
+    std::vector<double> at_rest(model_.state_count());
+    model_.straight_motion(speed, parameters_.data(), at_rest.data(), inputs.data());
+    const double share = 0.2 * std::sin(0.3 * time_ + phase_);
+    inputs[0] *= 1.0 - share;
+    inputs[1] *= 1.0 + share;
+  }
   const Model& model_;
   double step_, phase_, time_ = 0.0, distance_ = 0.0;
   std::vector<double> parameters_, slopes_;
@@ -89,7 +104,8 @@ Episode drive_with_fault(const Robot& robot, const Fault& fault, std::uint64_t s
   const Roles& roles = model.description().roles;
   Truth truth(robot, 0.7 * static_cast<double>(seed));
   const auto estimator = robot.make_estimator(truth.state);
-  const double speed = 2.0 + 2.0 * static_cast<double>(seed % 4);
+  const double usual = roles.speed >= 0 ? 2.0 : 0.5;  // slow ones turn by their sides [m/s]
+  const double speed = usual * static_cast<double>(1 + seed % 4);
   Episode episode;
   Delivery delivery;
   delivery.outputs.assign(model.output_count(), 0.0);

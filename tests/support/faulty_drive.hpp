@@ -54,7 +54,8 @@ struct Episode {
   int samples_to_ok() const;
 };
 
-/// Drives a robot of one steered or skid-steered vehicle open-loop along bends, at a step of `robot.step()`.
+/// Drives a robot open-loop along bends, at a step of `robot.step()`: a steered one at 2 to 8 m/s, one that turns by
+/// the wheels of its sides at 0.5 to 2 m/s.
 Episode drive_with_fault(const Robot& robot, const Fault& fault, std::uint64_t seed, int samples_after = 120);
 
 }  // namespace rhec::testing

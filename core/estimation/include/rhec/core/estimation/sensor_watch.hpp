@@ -30,6 +30,7 @@ class WalkingFilter;
 ///     it is rather the estimate that is off, and a few samples are enough, as they are for one that has come back;
 ///   - the measured inputs are wrong: they count as typical motion, at every sample. Where neither of the others lasts
 ///     and this does, the estimate goes on without inputs until they fit again.
+/// Where a position fails, another sensor may be wrong that was believed: see docs/health.md.
 /// A measurement that passes its gate again ends all of this.
 ///
 /// As long as it is open whether slip has jumped, what is given out is the second moment of both answers (`widen`).
@@ -118,6 +119,7 @@ class RHEC_EXPORT SensorWatch {
  private:
   struct Hypothesis;
   struct Memory;
+  struct Suspicion;
   /// Of a sensor, in a row.
   struct Record {
     int failures = 0, passes = 0;
@@ -146,6 +148,10 @@ class RHEC_EXPORT SensorWatch {
   Finding accept(Hypothesis&hypothesis) noexcept, come_back() noexcept;
   double consider_slip() noexcept;
   bool retract_slip() noexcept;
+  bool replay_without(const Suspicion& suspicion, WalkingFilter& filter, bool change) noexcept;
+  Finding accuse(const Suspicion& suspicion, const Record& error, const double* outputs) noexcept;
+  bool consider_other(const double* outputs, Finding& finding) noexcept;
+  bool is_placed_by_other(int position) const noexcept;
   void consider_moved(double likelihood_of_new_slip) noexcept;
   void consider_return(double time) noexcept, leave_place(double time, bool after_gap) noexcept;
   void note_jump() noexcept, note_followed() noexcept, begin_edge(bool is_new) noexcept;
@@ -156,7 +162,7 @@ class RHEC_EXPORT SensorWatch {
   void acquit(const double*outputs) noexcept, end_dispute() noexcept;
   bool sees_position(int output) const noexcept, sees_position(const std::vector<int>&outputs) const noexcept;
   bool is_position_disputed() const noexcept, is_place_lost() const noexcept, is_placed_otherwise() const noexcept;
-  bool is_within_bounds(const WalkingFilter&filter) const noexcept, is_probably_slip() const noexcept;
+  bool is_within_bounds(const Eigen::VectorXd&mean) const noexcept, is_probably_slip() const noexcept;
   void test_inputs(const double* outputs) noexcept;
   void note_offsets() noexcept, note_corrected(bool has_jumped) noexcept;
   void remember(double time, const double* outputs) noexcept;

@@ -1,0 +1,182 @@
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "innovation.hpp"
+#include "sensor_watch_parts.hpp"
+
+// A compass or an encoder that was believed, and is wrong: the position tells.
+
+namespace rhec {
+
+namespace {
+
+// Since so many measured positions it may be wrong.
+constexpr int wrong_since[] = {3, 6, 12, 24};
+// Measurements of a disputed position at which that is looked for.
+constexpr int looked_for = 5;
+// Samples that may be replayed for it within one call.
+constexpr int most_replayed = 256;
+// A sensor that is off since then has jumped by at least this share of its innovation at once, as nu' S^-1 nu.
+constexpr double at_once = 0.25;
+// How wrong an angle may have been made by a sensor before it was rejected [rad].
+constexpr double wrong_angle = 0.3;
+
+}  // namespace
+
+/// That a sensor is wrong since so many samples. `anew`: what it has said of its states before counts no longer, nor
+/// does what was made of that for slip.
+struct SensorWatch::Suspicion {
+  std::size_t sensor = 0;
+  int ago = 0;
+  bool anew = false;
+};
+
+/// Goes on from what was known before a suspicion to what is expected now, without what is not missing in `retracted`,
+/// but with the positions that were rejected since. Whether these pass their gates then, and the sensor has jumped and
+/// fails a close gate (or is rejected anyway). `change`: what is remembered becomes that.
+bool SensorWatch::replay_without(const Suspicion& suspicion, WalkingFilter& filter, bool change) noexcept {
+  Memory& memory = *memory_;
+  const Sensor& sensor = sensors_[suspicion.sensor];
+  const bool is_rejected = records_[suspicion.sensor].failures > 0;
+  bool is_off = is_rejected, are_explained = true;
+  double jump = 0.0;
+  Innovation::OfSensor<1> before;
+  const auto compare = [&](Measured outputs, Measured positions) {
+    filter.expect();
+    if (!is_rejected && filter.innovation(sensor, outputs, scratch_)) {
+      if (before.size() != scratch_.value.size()) before.setZero(scratch_.value.size());
+      jump = std::max(jump, squared_size(scratch_.value - before, scratch_.covariance));
+      before = scratch_.value;
+      const auto degrees = static_cast<std::size_t>(before.size());
+      const bool has_jumped = suspicion.anew || jump > at_once * scratch_.nis;
+      is_off = scratch_.nis > (has_jumped ? close_limits_ : limits_)[degrees];
+    }
+    for (const Sensor& each : sensors_)
+      if (sees_position(each.outputs) && filter.innovation(each, positions, scratch_))
+        are_explained = are_explained && scratch_.nis <= limits_[static_cast<std::size_t>(scratch_.value.size())];
+  };
+  const Memory::Entry& first = memory.entry(suspicion.ago);
+  filter.mean() = first.mean;
+  filter.covariance() = first.covariance;
+  if (suspicion.anew) {
+    filter.restart_parameters(setup_.parameter_sigmas);
+    const std::vector<Variable>& states = filter.model().description().states;
+    for (int i = 0; i < filter.model().state_count(); ++i) {
+      if (std::ranges::none_of(sensor.outputs, [&](int j) { return filter.depends_on(j, i); })) continue;
+      const double sigma = states[i].is_angle ? wrong_angle : states[i].scale;
+      filter.covariance()(i, i) = std::max(filter.covariance()(i, i), sigma * sigma);
+    }
+  }
+  for (int ago = suspicion.ago; ago > 0; --ago) {
+    Memory::Entry& next = memory.entry(ago - 1);
+    filter.predict(memory.entry(ago).inputs.data(), next.time - memory.entry(ago).time);
+    compare(next.outputs.measured(), next.rejected.measured());
+    memory.replayed = next.outputs;
+    memory.replayed.remove(memory.retracted.data());
+    memory.replayed.add(next.rejected.measured());
+    filter.update_as_expected(memory.replayed.measured());
+    if (!change) continue;
+    std::swap(next.outputs, memory.replayed);
+    next.rejected.clear();
+    copy_numbers(filter.mean(), next.mean);
+    copy_numbers(filter.covariance(), next.covariance);
+  }
+  filter.predict(input_.data(), memory.duration);
+  compare(weighed(raw_.data()), weighed(raw_.data()));
+  return is_off && are_explained;
+}
+
+/// The filter becomes what it would be if the suspicion had been known, and positions that were rejected are given
+/// back.
+SensorWatch::Finding SensorWatch::accuse(const Suspicion& suspicion, const Record& error,
+                                         const double* outputs) noexcept {
+  Memory& memory = *memory_;
+  held_count_ = memory.jump_count = 0;
+  for (int ago = suspicion.ago; ago-- > 0 && held_count_ < std::ssize(held_);) {
+    const Memory::Entry& entry = memory.entry(ago);
+    held_[held_count_] = {entry.time, entry.rejected};
+    for (std::size_t j = 0; j < raw_.size(); ++j)
+      if (!std::isnan(entry.rejected[j])) {
+        ++held_count_;
+        break;
+      }
+  }
+  const double since = memory.entry(suspicion.ago).time;
+  memory.released = {since, since, memory.retracted.data()};
+  memory.since_release = std::numeric_limits<int>::max();
+  replay_without(suspicion, own_->filter, true);
+  for (const int j : sensors_[suspicion.sensor].outputs) raw_[static_cast<std::size_t>(j)] = Memory::unknown;
+  own_->filter.update_as_expected(weighed(raw_.data()));
+  memory.offsets->forget_onsets();
+  acquit(outputs);
+  end_dispute();
+  // Slip that has jumped just now does not explain a sensor that has been wrong for some time.
+  is_disputed_ = true;
+  disputed_samples_ = suspicion.ago;
+  std::fill(records_.begin(), records_.end(), Record{});
+  records_[suspicion.sensor] = error;
+  std::uint32_t& findings = findings_[suspicion.sensor];
+  SensorHealth& state = states_[suspicion.sensor];
+  if (!suspicion.anew) {
+    --state.accepted;
+    ++state.rejected;
+  }
+  findings |= reason::rejected;
+  return {.release = true, .retract = true};
+}
+
+/// Whether another sensor that sees the position has passed its gate, and has not been silent for long since.
+bool SensorWatch::is_placed_by_other(int position) const noexcept {
+  const double now = heard_[static_cast<std::size_t>(position)];
+  for (std::size_t s = 0; s < sensors_.size(); ++s)
+    if (static_cast<int>(s) != position && sees_position(sensors_[s].outputs) && records_[s].failures == 0 &&
+        now - heard_[s] <= Memory::longest_gap)
+      return true;
+  return false;
+}
+
+/// Whether a position fails since another sensor is wrong: without that one since some time all positions are
+/// explained, and it is not.
+bool SensorWatch::consider_other(const double* outputs, Finding& finding) noexcept {
+  Memory& memory = *memory_;
+  const int position = disputed_position();
+  if (position < 0) return false;
+  const Record& record = records_[static_cast<std::size_t>(position)];
+  // Another position that passes says that this one is wrong; behind a gap it is the estimate.
+  if (record.after_gap || is_placed_by_other(position)) return false;
+  const bool is_unexplained = moved_->refuted > 0 && moved_->explained < Memory::informed;
+  const bool is_withdrawn = record.failures == suspect_position && memory.offsets->has_recent();
+  const bool is_late = record.failures > looked_for || is_withdrawn;
+  if (is_late && !is_unexplained) return false;
+  int replayed = 0;
+  for (const int positions : wrong_since) {
+    const int ago = memory.samples_with_positions(positions);
+    if (ago == 0 || memory.has_gap(ago)) return false;
+    for (std::size_t s = 0; s < sensors_.size(); ++s) {
+      if (sees_position(sensors_[s].outputs)) continue;
+      const Record& own = records_[s];
+      const Suspicion suspicion{.sensor = s, .ago = ago, .anew = own.failures > 0 || is_late};
+      // One that fails at once with the position does so because of slip.
+      if (own.failures > 0 && own.failures < suspect_after + record.failures) continue;
+      if (suspicion.anew && ago <= std::max(own.failures, record.failures)) continue;
+      std::ranges::fill(memory.retracted, Memory::unknown);
+      for (const int j : sensors_[s].outputs) memory.retracted[static_cast<std::size_t>(j)] = 0.0;
+      // An encoder that is much quicker than the position makes that long.
+      replayed += ago;
+      if (replayed > most_replayed) return false;
+      WalkingFilter& trial = *memory.trial;
+      if (!replay_without(suspicion, trial, false)) continue;
+      Record error = own;
+      if (trial.innovation(sensors_[s], weighed(raw_.data()), scratch_))
+        error = {.error = scratch_.value, .covariance = scratch_.covariance};
+      error.failures = std::max(ago, suspect_after);
+      finding = accuse(suspicion, error, outputs);
+      return true;
+    }
+  }
+  return false;
+}
+
+}  // namespace rhec
