@@ -55,7 +55,7 @@ bool SensorWatch::replay_without(const Suspicion& suspicion, WalkingFilter& filt
     }
     for (const Sensor& each : sensors_)
       if (sees_position(each.outputs) && filter.innovation(each, positions, scratch_))
-        are_explained = are_explained && scratch_.nis <= limits_[static_cast<std::size_t>(scratch_.value.size())];
+        are_explained = are_explained && scratch_.nis <= close_limits_[static_cast<std::size_t>(scratch_.value.size())];
   };
   const Memory::Entry& first = memory.entry(suspicion.ago);
   filter.mean() = first.mean;
