@@ -126,7 +126,8 @@ void KalmanFilter::update_as_expected(Measured y) noexcept {
 }
 
 void KalmanFilter::find_scale_slopes(Measured y) noexcept {
-  for (const auto [j, k] : noise_.scaled_outputs) {
+  for (const ScaledOutput& scaled : noise_.scaled_outputs) {
+    const int j = scaled.output, k = scaled.state;
     if (std::isnan(y[j])) continue;
     const double innovation = y[j] - predicted_[j];
     output_jacobian_[k * ny_ + j] = scale_slope(
