@@ -11,8 +11,12 @@
 // with these assignments in addition; estimators that remember places keep their maps. scripts/measure/second-lap uses
 // that. What stands beside sees `--outliers SHARE` of its fixes shifted by metres (5 m standard deviation), and all
 // fixes `--late SAMPLES` late; the driving estimator does not. --series FILE takes the parameters, true and estimated,
-// of every sample. scripts/measure/conditions uses these.
+// of every sample. scripts/measure/conditions uses these. Biases and scale errors of sensors have an entry each under
+// "sensors": mean absolute error, shares of samples within one, two and three standard deviations, signed error and
+// standard deviation at the end, and the share of the drive until that is half of what it was at the start (null:
+// never). scripts/measure/biases uses these.
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <cstdint>
@@ -155,12 +159,38 @@ class ForwardingHooks final : public RobotHooks {
   Trouble trouble_;
 };
 
+/// What is found of a bias or a scale error.
+struct SensorErrors {
+  int count = 0, known_from = -1;
+  double sum = 0.0, start_sigma = 0.0, end = 0.0, end_sigma = 0.0;
+  std::array<int, 3> within{};
+  void add(double error, double sigma) {
+    if (count == 0) start_sigma = sigma;
+    for (std::size_t k = 0; k < within.size(); ++k) within[k] += std::abs(error) <= static_cast<double>(k + 1) * sigma;
+    if (known_from < 0 && sigma <= 0.5 * start_sigma) known_from = count;
+    ++count;
+    sum += std::abs(error);
+    end = error;
+    end_sigma = sigma;
+  }
+  std::string json() const {
+    const auto share = [&](int part) { return static_cast<double>(part) / count; };
+    return fmt::format(
+        R"({{"error": {:.6g}, "within": [{:.6g}, {:.6g}, {:.6g}], "end": {:.6g}, "end_sigma": {:.6g}, "known": {}}})",
+        sum / count, share(within[0]), share(within[1]), share(within[2]), end, end_sigma,
+        known_from < 0 ? "null" : fmt::format("{:.6g}", share(known_from)));
+  }
+};
+
 /// Errors of one estimator over a drive.
 struct Errors {
-  explicit Errors(const ModelDescription& description)
+  /// `vehicle_states`: of the description's states, those before the errors of sensors.
+  Errors(const ModelDescription& description, Eigen::Index vehicle_states)
       : about(description),
+        first_sensor(vehicle_states),
         parameters(description.parameters.size(), 0.0),
-        inside(description.parameters.size(), 0.0) {}
+        inside(description.parameters.size(), 0.0),
+        sensors(description.states.size() - static_cast<std::size_t>(vehicle_states)) {}
   void add(const sim::Sample& truth, const Eigen::VectorXd& state, const Eigen::VectorXd& p,
            const Eigen::MatrixXd& covariance) {
     ++count;
@@ -182,6 +212,10 @@ struct Errors {
       parameters[j] += std::abs(error[k]);
       inside[j] += std::abs(error[k]) <= 2.0 * std::sqrt(known(k, k));
     }
+    for (std::size_t e = 0; e < sensors.size(); ++e) {
+      const Eigen::Index k = first_sensor + static_cast<Eigen::Index>(e);
+      sensors[e].add(error[k], std::sqrt(known(k, k)));
+    }
     nees += error.dot(known.ldlt().solve(error));
   }
   std::string json() const {
@@ -191,13 +225,20 @@ struct Errors {
     for (std::size_t j = 0; j < parameters.size(); ++j)
       text += fmt::format(", \"{0}\": {1:.6g}, \"{0}_inside\": {2:.6g}", about.parameters[j].name, mean(parameters[j]),
                           mean(inside[j]));
-    return text;
+    if (sensors.empty()) return text;
+    text += ", \"sensors\": {";
+    for (std::size_t e = 0; e < sensors.size(); ++e)
+      text += fmt::format("{}\"{}\": {}", e == 0 ? "" : ", ",
+                          about.states[static_cast<std::size_t>(first_sensor) + e].name, sensors[e].json());
+    return text + "}";
   }
 
   const ModelDescription& about;
+  Eigen::Index first_sensor;
   int count = 0;
   double position = 0.0, heading = 0.0, nees = 0.0;
   std::vector<double> parameters, inside;
+  std::vector<SensorErrors> sensors;
 };
 
 /// What a smoother says of the drive, node by node, in place of its estimator's causal estimates.
@@ -305,7 +346,8 @@ void drive(const Host& host, const Arguments& arguments, const std::string& more
   };
   for (const std::string& beside : arguments.beside) add(beside, nullptr);
   for (const std::string& smoothed : arguments.smoothed) add(smoothed, std::make_shared<NodeLog>());
-  const ModelDescription& about = driver.robot().bounded_description();
+  const ModelDescription& about = driver.robot().estimated_description();
+  const auto vehicle_states = std::ssize(driver.robot().bounded_description().states);
   sim::LoopHooks hooks;
   Trouble trouble = arguments.trouble;
   trouble.seed = driver.options().seed;
@@ -319,7 +361,7 @@ void drive(const Host& host, const Arguments& arguments, const std::string& more
   for (Beside& other : others) {
     if (other.estimates.size() != log.samples.size())
       throw Error(fmt::format("{} estimates for {} samples", other.estimates.size(), log.samples.size()));
-    Errors errors(about);
+    Errors errors(about, vehicle_states);
     for (std::size_t i = 0; i < log.samples.size(); ++i)
       errors.add(log.samples[i], other.estimates[i].state, other.estimates[i].parameters,
                  other.estimates[i].covariance);

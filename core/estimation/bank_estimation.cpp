@@ -24,7 +24,8 @@ BankEstimation::BankEstimation(const std::shared_ptr<const Model>& model, Setup 
   if (setup_.heading_starts > 1 && model->description().roles.heading >= 0) {
     FilterEstimation::Setup search;
     search.noise = {setup_.bank.output_variances, setup_.bank.input_variances, setup_.parameter_lower,
-                    setup_.parameter_upper, setup_.bank.motion_outputs};
+                    setup_.parameter_upper,       setup_.bank.motion_outputs,  {},
+                    setup_.bank.scaled_outputs};
     search.walk.assign(np, 0.0);
     search.initial_mean = mean_;
     search.initial_mean.head(nx) = setup_.initial_state;

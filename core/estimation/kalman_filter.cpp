@@ -13,6 +13,7 @@
 #include "rhec/core/base/with_size.hpp"
 #include "rhec/core/estimation/measurement.hpp"
 #include "rhec/core/horizon/rhe_problem.hpp"
+#include "scale_slope.hpp"
 
 namespace rhec {
 namespace {
@@ -57,6 +58,7 @@ KalmanFilter::KalmanFilter(std::shared_ptr<const Model> model, Noise noise, int 
   scratch_.assign(model_->rows_scratch(1), 0.0);
   work_ = next_covariance_ = Eigen::MatrixXd::Zero(n, n);
   gain_ = image_ = zeros_ = correction_ = Eigen::VectorXd::Zero(n);
+  kept_rows_.assign(noise_.motion_outputs.empty() ? 0 : noise_.scaled_outputs.size() * (1 + nx_), 0.0);
   if (most_between == 0 && noise_.motion_outputs.empty()) return;
   const int motion = static_cast<int>(noise_.motion_outputs.size()), nz = nx_ + nu_ + 2 * np_, plain = n + nu_ + np_;
   if (motion > 0) curved_ = curved_states(*model_);
@@ -109,6 +111,7 @@ void KalmanFilter::update(Measured y, const double* information_weights) noexcep
 
 void KalmanFilter::update_as_expected(Measured y) noexcept {
   std::ranges::fill(added_, 0.0);
+  find_scale_slopes(y);
   if (std::ranges::any_of(curved_outputs_, [y](int j) { return !std::isnan(y[j]); })) {
     // Once to see where the outputs put the state, then linearised there.
     before_ = covariance;
@@ -120,6 +123,19 @@ void KalmanFilter::update_as_expected(Measured y) noexcept {
   take_outputs(y);
   mean += correction_;
   clip();
+}
+
+void KalmanFilter::find_scale_slopes(Measured y) noexcept {
+  for (const ScaledOutput& scaled : noise_.scaled_outputs) {
+    const int j = scaled.output, k = scaled.state;
+    if (std::isnan(y[j])) continue;
+    const double innovation = y[j] - predicted_[j];
+    output_jacobian_[k * ny_ + j] = scale_slope(
+        nx_, k, 1.0 + mean[k],
+        model_->description().outputs[j].is_angle ? angle_difference(innovation, 0.0) : innovation,
+        noise_.output_variances[j] / y.weight(j), [&](int c) { return output_jacobian_[c * ny_ + j]; },
+        [&](int r, int c) { return covariance(r, c); });
+  }
 }
 
 /// One output after the other, all linearised at the same point; the noises are independent.
@@ -134,10 +150,20 @@ void KalmanFilter::take_outputs(Measured y) noexcept {
 /// second-order terms, by the covariance after the update and before it.
 void KalmanFilter::linearise_outputs() noexcept {
   if (!point_.head(nx_).allFinite()) return;
+  // Scaled outputs stay as they are linearised.
+  const auto exchange_rows = [&](auto exchange) {
+    double* row = kept_rows_.data();
+    for (const auto [j, k] : noise_.scaled_outputs) {
+      exchange(predicted_[j], *row++);
+      for (int c = 0; c < nx_; ++c) exchange(output_jacobian_[c * ny_ + j], *row++);
+    }
+  };
+  exchange_rows([](double& own, double& kept) { kept = own; });
   model_->observe(
       {.count = 1, .states = point_.data(), .outputs = predicted_.data(), .jacobians = output_jacobian_.data()});
   for (int j = 0; j < ny_; ++j)
     for (int c = 0; c < nx_; ++c) predicted_[j] += output_jacobian_[c * ny_ + j] * (mean[c] - point_[c]);
+  exchange_rows([](double& own, double& kept) { own = kept; });
   output_curvature_.observe(*model_, curved_outputs_, point_.data());
   output_curvature_.find_factor([&](std::ptrdiff_t r, std::ptrdiff_t c) { return before_(r, c); });
   output_curvature_.find_means([&](std::ptrdiff_t r, std::ptrdiff_t c) { return covariance(r, c); });

@@ -8,6 +8,7 @@
 #include "rhec/core/base/angle.hpp"
 #include "rhec/core/base/assertion.hpp"
 #include "rhec/core/estimation/kalman_filter.hpp"
+#include "scale_slope.hpp"
 
 namespace rhec {
 
@@ -297,8 +298,14 @@ void KalmanFilter::take_between(const MeasuredInterval& interval, int which, con
   if (weights) weights += static_cast<std::ptrdiff_t>(which) * ny_;
   for (int j = 0; j < ny_; ++j) {
     if (std::isnan(y[j])) continue;
-    const double innovation = expect_wide(j, y[j]);
-    take_wide(innovation, noise_.output_variances[j] / (weights ? weights[j] : 1.0));
+    const double innovation = expect_wide(j, y[j]),
+                 variance = noise_.output_variances[j] / (weights ? weights[j] : 1.0);
+    for (const auto [output, k] : noise_.scaled_outputs)
+      if (output == j)
+        wide_gradient_[k] = scale_slope(
+            static_cast<int>(wide_gradient_.size()), k, 1.0 + wide_mean_[k], innovation, variance,
+            [&](int c) { return wide_gradient_[c]; }, [&](int r, int c) { return wide_covariance_(r, c); });
+    take_wide(innovation, variance);
   }
 }
 

@@ -190,7 +190,8 @@ PriorBank::PriorBank(std::shared_ptr<const Model> model, Setup setup)
     for (const RobustLoss& loss : setup_.robust) single.insert(single.end(), loss.outputs.begin(), loss.outputs.end());
     ahead_ = std::make_unique<LookAhead>(LookAhead{
         .mixture = {model_,
-                    {setup_.output_variances, setup_.input_variances, lower, upper, setup_.motion_outputs, single},
+                    {setup_.output_variances, setup_.input_variances, lower, upper, setup_.motion_outputs, single,
+                     setup_.scaled_outputs},
                     setup_.substeps,
                     setup_.most_between},
         .excitation = {model_, setup_.motion_outputs, setup_.substeps,
@@ -201,6 +202,7 @@ PriorBank::PriorBank(std::shared_ptr<const Model> model, Setup setup)
     ahead_->part.assign(ny_, 0.0);
     ahead_->shares.assign(static_cast<std::size_t>(ahead_->mixture.summary().most()), 0.0);
     ahead_->surprises.assign(ny_ * M, 0.0);
+    ahead_->kept_rows.assign(setup_.scaled_outputs.size() * (1 + nx) * M, 0.0);
     learnt_.resize(learnt_.size() + ahead_->excitation.history_size(), 0.0);
     ahead_->no_input.assign(nu_, 0.0);
     const auto a = static_cast<std::size_t>(wide_count());
@@ -235,6 +237,7 @@ PriorBank::PriorBank(std::shared_ptr<const Model> model, Setup setup)
   map_variances_ = map_means_;
   input_.assign(nu_, 0.0);
   added_.assign(ny_, 0.0);
+  counted_.assign(ny_, 0.0);
   variances_.assign(nu_, 0.0);
   for (auto* v : {&start_, &own_, &own_covariance_, &filled_, &filled_covariance_})
     v->assign(std::size_t{Prior::max_states} * Prior::max_states, 0.0);
@@ -401,6 +404,7 @@ double PriorBank::take_outputs(const Frame& frame, const double* y, const double
   std::fill(squares_.begin(), squares_.end(), 0.0);
   const int taken = view_outputs(frame.gradient, entries, y);
   if (taken == 0) return 0.0;
+  find_scale_slopes(frame, y);
   if (!setup_.robust.empty()) weigh_outputs(frame, y, taken, robust_weights);
   if (ahead_ && members_ > 1)
     ahead_->bound_surprises(view, *views_, y, setup_.motion_outputs, output_variances_.data());

@@ -60,7 +60,7 @@ int PriorBank::wide_count() const noexcept {
 /// and have that filter's second-order terms.
 MeasuredInterval PriorBank::look_ahead(const MeasuredInterval& measured, Measured end_outputs) noexcept {
   const std::ptrdiff_t M = lanes_;
-  for (int j = 0; j < ny_; ++j) ahead_->mixture.set_output_variance(j, learnt_[j]);
+  for (int j = 0; j < ny_; ++j) ahead_->mixture.set_output_variance(j, counted_[j]);
   for (int j = 0; j < np_; ++j) {
     const Process& process = processes_[j];
     ahead_->ramp_variances[j] = 0.0;
@@ -89,7 +89,7 @@ MeasuredInterval PriorBank::look_ahead(const MeasuredInterval& measured, Measure
   const bool is_held =
       members_ > 1 && ahead_->excitation.find(interval, ahead_->mixture.summary().weights(), end_outputs,
                                               {ahead_->mixture.mean, ahead_->mixture.covariance, input_.data(),
-                                               variances_.data(), learnt_.data()},
+                                               variances_.data(), counted_.data()},
                                               learnt_.data() + 2 * static_cast<std::ptrdiff_t>(ny_));
   const auto hold = [&] {
     const Eigen::VectorXd& target = ahead_->excitation.target();
@@ -123,11 +123,23 @@ void PriorBank::linearise_given(const double* y) noexcept {
                         innovation_variances_.data());
   for (std::ptrdiff_t m = 0; m < M; ++m)
     for (int r = 0; r < nx_; ++r) states_[m * nx_ + r] = ahead_->trial_mean[r * M + m];
+  // Scaled outputs stay linearised at the means.
+  const auto exchange_rows = [&](auto exchange) {
+    double* row = ahead_->kept_rows.data();
+    for (const auto [output, state] : setup_.scaled_outputs) {
+      const std::ptrdiff_t j = output;
+      exchange(predicted_.data() + j * M, row, M);
+      exchange(gradient_.data() + j * nx_ * M, row + M, nx_ * M);
+      row += (1 + nx_) * M;
+    }
+  };
+  exchange_rows([](double* own, double* kept, std::ptrdiff_t count) { std::copy_n(own, count, kept); });
   linearise_nodes();
   for (std::ptrdiff_t j = 0; j < ny_; ++j)
     for (std::ptrdiff_t c = 0; c < nx_; ++c)
       for (std::ptrdiff_t m = 0; m < M; ++m)
         predicted_[j * M + m] += gradient_[(j * nx_ + c) * M + m] * (mean_[c * M + m] - ahead_->trial_mean[c * M + m]);
+  exchange_rows([](double* own, double* kept, std::ptrdiff_t count) { std::copy_n(kept, count, own); });
   bank_kernels().moments(trial, weights_.data(), full_mean_.data(), full_covariance_.data());
   Curvature& terms = ahead_->output_curvature;
   terms.observe(*model_, ahead_->curved_outputs, full_mean_.data());
@@ -316,7 +328,7 @@ const double* PriorBank::reading_weights(int which) const noexcept {
 void PriorBank::weigh_readings(int which) noexcept {
   const double* const weights = reading_weights(which);
   for (std::ptrdiff_t j = 0; j < ny_; ++j)
-    std::fill_n(output_variances_.data() + j * lanes_, lanes_, learnt_[j] / weights[j]);
+    std::fill_n(output_variances_.data() + j * lanes_, lanes_, counted_[j] / weights[j]);
   if (members_ == 1) return;
   const std::ptrdiff_t M = lanes_;
   const double share = ahead_->shares[static_cast<std::size_t>(which)];

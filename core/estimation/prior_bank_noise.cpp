@@ -5,6 +5,7 @@
 #include "prior_bank_views.hpp"
 #include "rhec/core/base/angle.hpp"
 #include "rhec/core/kernels/kernel_sets.hpp"
+#include "scale_slope.hpp"
 
 namespace rhec {
 namespace {
@@ -24,14 +25,43 @@ void PriorBank::reset_noise() noexcept {
 }
 
 /// To all lanes, of outputs with weights (null: 1).
+///
+/// A variance R that was learnt from few residuals is too small as often as too large, and where it is too small a
+/// measurement counts for too much. What changes forgets that, but a constant, such as a bias, does not: it would be
+/// certain too soon. Of n residuals the variance V of R relative to its square is 2 / n, the posterior of R is an
+/// inverse gamma distribution, and its mean is R (1 + V) in the first order (Gelman et al. 2013, section 3.3). Before
+/// anything is learnt, what is stated counts.
 void PriorBank::spread_variances(const double* weights) noexcept {
-  for (int j = 0; j < ny_; ++j)
+  for (int j = 0; j < ny_; ++j) {
+    const double V = learnt_[ny_ + sensor_[j]];
+    counted_[j] = learnt_[j] * (setup_.adapts_noise && V < unknown_noise ? 1.0 + V : 1.0);
     std::fill_n(output_variances_.data() + static_cast<std::ptrdiff_t>(j) * lanes_, lanes_,
-                weights ? learnt_[j] / weights[j] : learnt_[j]);
+                weights ? counted_[j] / weights[j] : counted_[j]);
+  }
+}
+
+/// Derivatives of outputs with scale errors by these.
+void PriorBank::find_scale_slopes(const Frame& frame, const double* y) noexcept {
+  const BankView& view = frame.view;
+  for (const auto [output, state] : setup_.scaled_outputs) {
+    if (std::isnan(y[output])) continue;
+    const std::ptrdiff_t j = output, entries = view.vehicle_states;
+    const bool is_angle = model_->description().outputs[output].is_angle;
+    for (std::ptrdiff_t m = 0; m < lanes_; ++m) {
+      const double innovation = y[j] - predicted_[j * lanes_ + m];
+      const auto gradient = [&](int c) { return frame.gradient[(j * entries + c) * lanes_ + m]; };
+      frame.gradient[(j * entries + state) * lanes_ + m] =
+          scale_slope(view.vehicle_states, state, 1.0 + view.mean[state * lanes_ + m],
+                      is_angle ? angle_difference(innovation, 0.0) : innovation, output_variances_[j * lanes_ + m],
+                      gradient, [&](int r, int c) {
+                        return view.covariance[(static_cast<std::ptrdiff_t>(c) * view.states + r) * lanes_ + m];
+                      });
+    }
+  }
 }
 
 PriorBank::Noise PriorBank::noise(int output) const noexcept {
-  return {learnt_[output], !setup_.adapts_noise || learnt_[ny_ + sensor_[output]] < known_noise};
+  return {learnt_[output], counted_[output], !setup_.adapts_noise || learnt_[ny_ + sensor_[output]] < known_noise};
 }
 
 bool PriorBank::is_of_motion(int output) const noexcept {
@@ -41,8 +71,10 @@ bool PriorBank::is_of_motion(int output) const noexcept {
 /// The innovation nu of an output has the variance S = h' P h + R before the update. With i = R / S, the residual r and
 /// the covariance after it, nu^2 - S = (r^2 + h' P h - R) / i^2: a measurement of what R lacks, with the variance 2 S^2
 /// (Mehra 1970). R follows by a scalar Kalman filter in units of itself, whose own variance V says how well R is known;
-/// where S tells little about R, R hardly moves. Residuals are those of the most probable member. Outputs of one unit
-/// and one stated noise, like the coordinates of a position, are one sensor and change together.
+/// where S tells little about R, R hardly moves. What was used in its place, with what is not known of it and with
+/// variances of second-order terms, makes i larger, and of S a part that is not R. Residuals are those of the most
+/// probable member. Outputs of one unit and one stated noise, like the coordinates of a position, are one sensor and
+/// change together.
 ///
 /// Of an output of motion, what nodes measure does not count: the interval is linearised where they put it. That makes
 /// innovations smaller than S says, and little of S is R.
@@ -80,13 +112,20 @@ void PriorBank::adapt_noise(const Frame& frame, const double* y) noexcept {
     if (count == 0) continue;
     double &R = learnt_[sensor], &V = learnt_[ny_ + sensor];
     double information = std::max(1.0 - spread / used, least_information);
-    double surplus = std::min((squares + spread) / (count * R), most_squares) - 1.0;
+    const double relative = used / (count * R), beyond = counted_[sensor] / R - 1.0;
+    double expected = relative - beyond * information;  // i S / R, where S is that of R
+    double surplus =
+        (std::min((squares + spread) / used, most_squares) - 1.0) * relative + beyond * information * information;
     if (loss_of_[sensor] >= 0) {
       // The update was one with the weighted noise: what it found of h' P h holds for R as well.
-      information = R / (R + used / count * (1.0 / information - 1.0));
-      surplus = information * robust_surplus(y, sensor, best);
+      const double of_state = relative * (1.0 / information - 1.0);
+      information = 1.0 / (1.0 + of_state);
+      surplus =
+          (1.0 + robust_surplus(y, sensor, best)) * (1.0 + beyond + of_state) * information * information - information;
+      expected = 1.0;
     }
-    const double gain = V / (V * information * information + 2.0 / count);  // of the surplus, i.e. divided by i^2
+    // Of the surplus, i.e. divided by i^2.
+    const double gain = V / (V * information * information + 2.0 * expected * expected / count);
     const double change = 1.0 + gain * surplus;
     if (!std::isfinite(change)) continue;
     const double stated = setup_.output_variances[sensor], most = setup_.most_noise_change * setup_.most_noise_change;
@@ -102,7 +141,7 @@ void PriorBank::adapt_noise(const Frame& frame, const double* y) noexcept {
 void PriorBank::weigh_outputs(const Frame& frame, const double* y, int taken, const double* given) noexcept {
   for (int j = 0; j < ny_; ++j)
     std::fill_n(output_variances_.data() + static_cast<std::ptrdiff_t>(j) * lanes_, lanes_,
-                learnt_[j] / (frame.weights ? frame.weights[j] : 1.0) + added_[j]);
+                counted_[j] / (frame.weights ? frame.weights[j] : 1.0) + added_[j]);
   bank_kernels().surprise(frame.view, views_->outputs.data(), taken, surprises_.data());
   const auto place = [&](int output) {
     return std::count_if(y, y + output, [](double each) { return !std::isnan(each); });
@@ -128,7 +167,7 @@ double PriorBank::robust_weight(int output) const noexcept {
   // Noise that adapts has been spread anew since.
   const bool is_weighed = !stated_weights_.empty() && !setup_.robust.empty() && !setup_.adapts_noise;
   const double stated = is_weighed ? stated_weights_[output] : 1.0;
-  return (learnt_[output] / stated + added_[output]) /
+  return (counted_[output] / stated + added_[output]) /
          output_variances_[static_cast<std::ptrdiff_t>(output) * lanes_ + most_probable()];
 }
 

@@ -43,6 +43,7 @@ struct PriorBank::LookAhead {
   std::vector<double> part = {};    ///< n_y: some of the outputs of a time
   AlignedDoubles surprises = {};    ///< n_y, lanes
   Measured end_outputs = {};        ///< of the interval
+  AlignedDoubles kept_rows = {};    ///< lanes, of scaled outputs: value and derivatives
   /// Raises the variances of outputs of motion (n_y, lanes) whose innovations are far larger than expected.
   void bound_surprises(const BankView& view, const Views& views, const double* y,
                        const std::vector<int>& motion_outputs, double* variances) noexcept;
@@ -69,7 +70,7 @@ struct PriorBank::Views {
 /// The bank, or the wider vector that it is within an interval, with the outputs' gradients.
 struct PriorBank::Frame {
   BankView view;
-  const double* gradient;  ///< n_y x view.vehicle_states, lanes
+  double* gradient;  ///< n_y x view.vehicle_states, lanes
   /// Means before: entry e of lane m is at e * before_entry + m * before_lane.
   const double* before;
   std::ptrdiff_t before_entry, before_lane;

@@ -159,7 +159,7 @@ void PriorHorizonEstimation::fill_window() noexcept {
   const BankHistory::Node first = history.node(next.first);
   problem_.set_output(0, first.outputs);
   for (int i = 0; i < N; ++i) fill_interval(i, next.first + i + 1);
-  for (int j = 0; j < model().output_count(); ++j) problem_.set_output_weight(j, 1.0 / bank().noise(j).variance);
+  for (int j = 0; j < model().output_count(); ++j) problem_.set_output_weight(j, 1.0 / bank().noise(j).counted);
   write_arrival(first.predicted);
   problem_.finish();
   if (!has_guess || !shifter_.apply(static_cast<int>(steps), problem_, point_)) start_cold(point_);

@@ -110,7 +110,8 @@ KalmanFilter::Noise EstimatorParts::filter_noise() const {
           .input_variances = variances_of(context->noise.input_sigmas),
           .parameter_lower = lower_bounds_of(context->about.parameters),
           .parameter_upper = upper_bounds_of(context->about.parameters),
-          .motion_outputs = sensed_motion(*context->model)};
+          .motion_outputs = sensed_motion(*context->model),
+          .scaled_outputs = scaled_outputs(*context->model)};
 }
 
 BankEstimation::Setup EstimatorParts::filters() const {
@@ -122,6 +123,7 @@ BankEstimation::Setup EstimatorParts::filters() const {
   setup.bank.memory = bank.memory;
   setup.bank.robust = robust;
   setup.bank.motion_outputs = sensed_motion(*context->model);
+  setup.bank.scaled_outputs = scaled_outputs(*context->model);
   setup.bank.adapts_noise = context->noise.adapt;
   setup.bank.initial_parameters = initial_parameters;
   setup.parameter_lower = lower_bounds_of(context->about.parameters);

@@ -89,4 +89,17 @@ std::vector<int> sensed_motion(const Model& model) {
   return sensors ? sensors->motion().which() : std::vector<int>{};
 }
 
+std::vector<ScaledOutput> scaled_outputs(const Model& model) {
+  std::vector<ScaledOutput> scaled;
+  const SensorModel* const sensors = sensors_in(model);
+  if (!sensors) return scaled;
+  const std::vector<int>& of_motion = sensors->motion().which();
+  int state = sensors->first_scale();
+  for (const int output : sensors->errors().scaled) {
+    if (!std::ranges::binary_search(of_motion, output)) scaled.push_back({output, state});
+    ++state;
+  }
+  return scaled;
+}
+
 }  // namespace rhec

@@ -9,6 +9,7 @@
 #include "rhec/core/base/aligned.hpp"
 #include "rhec/core/estimation/curvature.hpp"
 #include "rhec/core/estimation/reading_summary.hpp"
+#include "rhec/core/estimation/scaled_output.hpp"
 #include "rhec/core/horizon/measured_interval.hpp"
 #include "rhec/core/model/model.hpp"
 
@@ -28,6 +29,8 @@ class RHEC_EXPORT KalmanFilter {
     std::vector<int> motion_outputs = {};
     /// Outputs of which each measurement counts by itself, also if there are many (ReadingSummary).
     std::vector<int> single_outputs = {};
+    /// Outputs with scale errors; none of motion. At 0 an output tells nothing of its scale, whatever its noise is.
+    std::vector<ScaledOutput> scaled_outputs = {};
     bool operator==(const Noise&) const = default;
   };
   /// `most_between`: measurements that there can be between two nodes.
@@ -128,6 +131,7 @@ class RHEC_EXPORT KalmanFilter {
   double input_variance(int input, const double* measured) const noexcept;
   void take_outputs(Measured y) noexcept;
   void linearise_outputs() noexcept;
+  void find_scale_slopes(Measured y) noexcept;
   void take_output(int output, double measured, double variance) noexcept;
   void make_symmetric() noexcept;
   void clip() noexcept;
@@ -138,6 +142,7 @@ class RHEC_EXPORT KalmanFilter {
   std::vector<int> curved_outputs_;                         ///< of motion
   Curvature output_curvature_;                              ///< of these, by the state
   std::vector<double> added_;                               ///< n_y: variances of second-order terms
+  std::vector<double> kept_rows_;                           ///< of scaled outputs: value and derivatives
   std::vector<double> innovations_, innovation_variances_;  ///< n_y, of the last update
   Eigen::MatrixXd gains_;                                   ///< (n_x + n_p) x n_y, likewise
   Eigen::MatrixXd before_;                                  ///< an update: the covariance

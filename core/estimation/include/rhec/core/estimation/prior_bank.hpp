@@ -104,6 +104,7 @@ class RHEC_EXPORT PriorBank {
   /// What has been learnt of an output's noise.
   struct Noise {
     double variance = 0.0;      ///< at present
+    double counted = 0.0;       ///< by which measurements count: with what is not known of it
     bool is_identified = true;  ///< false while the residuals say little about it
   };
   Noise noise(int output) const noexcept;
@@ -150,6 +151,7 @@ class RHEC_EXPORT PriorBank {
   void check_map() const;
   void follow_map() noexcept, add_offsets() noexcept;
   void adapt_noise(const Frame& frame, const double* y) noexcept;
+  void find_scale_slopes(const Frame& frame, const double* y) noexcept;
   static double scale_weight(double s, double delta) noexcept;
   double robust_surplus(const double* y, int sensor, int lane) const noexcept;
   int most_probable() const noexcept;
@@ -174,13 +176,13 @@ class RHEC_EXPORT PriorBank {
   AlignedDoubles wide_mean_, wide_before_, wide_covariance_, wide_work_, transition_;
   /// Per measurement between the nodes, and for the end: outputs as expected at `point_`, and their gradients.
   AlignedDoubles wide_predicted_, wide_gradient_;
-  AlignedDoubles point_;                ///< where the interval is linearised
-  std::vector<int> limited_;            ///< entries of [x; z] with bounds
-  std::vector<double> limits_;          ///< beyond these: lower and upper of each
-  std::vector<double> stated_weights_;  ///< of the outputs of the last update, n_y; empty: all were 1
-  std::unique_ptr<LookAhead> ahead_;    ///< null without outputs of motion
-  bool is_curved_ = false;              ///< whether the interval has second-order terms
-  std::vector<double> added_;           ///< n_y: variances of second-order terms
+  AlignedDoubles point_;                 ///< where the interval is linearised
+  std::vector<int> limited_;             ///< entries of [x; z] with bounds
+  std::vector<double> limits_;           ///< beyond these: lower and upper of each
+  std::vector<double> stated_weights_;   ///< of the outputs of the last update, n_y; empty: all were 1
+  std::unique_ptr<LookAhead> ahead_;     ///< null without outputs of motion
+  bool is_curved_ = false;               ///< whether the interval has second-order terms
+  std::vector<double> added_, counted_;  ///< n_y: variances of second-order terms; Noise::counted
   // Rows of the model: one per member.
   std::vector<double> states_, inputs_, parameters_, ends_, durations_, next_rows_, jacobian_rows_, output_rows_,
       gradient_rows_;

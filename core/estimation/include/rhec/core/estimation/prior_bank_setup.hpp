@@ -4,6 +4,7 @@
 #include <memory>
 #include <vector>
 
+#include "rhec/core/estimation/scaled_output.hpp"
 #include "rhec/core/horizon/rhe_problem.hpp"
 #include "rhec/core/place/slip_map.hpp"
 #include "rhec/core/prior/standard_bank.hpp"
@@ -51,6 +52,7 @@ struct PriorBankSetup {
   /// Outputs of motion, ascending: an interval is linearised where its measurements of these put it, as by a
   /// KalmanFilter.
   std::vector<int> motion_outputs = {};
+  std::vector<ScaledOutput> scaled_outputs = {};  ///< as of a KalmanFilter
   double gate = 16.0;  ///< largest squared innovation, in variances, by which one output changes the weights
 };
 

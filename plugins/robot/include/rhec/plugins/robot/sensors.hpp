@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "rhec/core/base/export.hpp"
+#include "rhec/core/estimation/scaled_output.hpp"
 #include "rhec/plugins/robot/robot_context.hpp"
 
 namespace rhec {
@@ -24,5 +25,7 @@ RHEC_EXPORT std::vector<double> initial_sensor_sigmas(const RobotContext& vehicl
 RHEC_EXPORT bool senses_motion(const Model& model) noexcept;
 /// The outputs of motion of such a model, ascending, by which a filter linearises an interval (KalmanFilter::predict).
 RHEC_EXPORT std::vector<int> sensed_motion(const Model& model);
+/// The other outputs of such a model that have a scale error, ascending.
+RHEC_EXPORT std::vector<ScaledOutput> scaled_outputs(const Model& model);
 
 }  // namespace rhec
