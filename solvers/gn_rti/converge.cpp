@@ -287,6 +287,7 @@ void GnRti::begin_at(const Iterate& guess) noexcept {
   attempts_ = 0;
   futile_ = 0;
   penalty_cuts_left_ = most_penalty_cuts;
+  first_price_ = 0.0;
   best_ = guess;
   // The line search does not vary a given initial state.
   if (ocp_->initial_state()) std::copy_n(ocp_->initial_state(), ocp_->state_count(0), best_.state(0));
