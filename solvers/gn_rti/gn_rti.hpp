@@ -78,6 +78,7 @@ class GnRti final : public Solver {
                                               Clock::time_point deadline) noexcept;
   void raise(double& penalty, double least) noexcept;
   bool is_futile() noexcept;
+  bool refine(Report& report, double residual, Clock::time_point deadline) noexcept;
   void begin_at(const Iterate& guess) noexcept;
   bool find_other_start(const Iterate& guess, bool is_feasible, Clock::time_point deadline) noexcept;
   StageQpSolver::Outcome solve_at_prices(Report& report, double& before, double& after,
@@ -86,7 +87,7 @@ class GnRti final : public Solver {
   bool search_along_step(Report& report, double residual, double& merit_after, Clock::time_point deadline) noexcept;
   bool correct_step(const StageQp& first, Report& report, Clock::time_point deadline) noexcept;
   // priced_steps.cpp
-  void begin_priced_at(const Iterate& guess) noexcept;
+  void begin_priced_at(const Iterate& guess, Report& report, Clock::time_point deadline) noexcept;
   void begin_priced(double price) noexcept;
   bool is_violation_stuck(int iterations) noexcept;
   bool is_nearly_feasible() noexcept;
@@ -95,6 +96,12 @@ class GnRti final : public Solver {
   StageQpSolver::Outcome solve_priced(Report& report, Clock::time_point deadline) noexcept;
   bool take_priced_step(Report& report, double residual, double& merit_after, Clock::time_point deadline,
                         bool& feasible, bool& late) noexcept;
+  // tracking_start.cpp
+  struct StartQuality {
+    double violation, cost;
+  };
+  StartQuality quality_of(const Iterate& iterate) noexcept;
+  bool find_tracking_start(const Iterate& guess, Report& report, Clock::time_point deadline) noexcept;
 
   Options options_;
   const Ocp* ocp_ = nullptr;
@@ -128,6 +135,8 @@ class GnRti final : public Solver {
   // Where limits seem impossible to meet.
   StartSearch search_;
   Iterate other_start_;
+  Iterate tracking_;
+  bool has_tracking_ = false;
 };
 
 }  // namespace rhec::gn_rti
