@@ -373,7 +373,7 @@ Report GnRti::converge(Iterate& iterate, Clock::time_point deadline) noexcept {
     }
 
     if (!limits_.empty() && !is_priced_ && is_violation_stuck(report.iterations - first_iteration)) {
-      begin_priced_at(*guess, report, deadline);
+      begin_priced_at(*guess, deadline);
       continue;
     }
     // Damped steps do better than short ones, and than those of a Hessian that is not convex.
@@ -437,7 +437,7 @@ Report GnRti::converge(Iterate& iterate, Clock::time_point deadline) noexcept {
     // The least violation around one point need not be the least of all: from a guess that is left in another direction
     // there may be none.
     if ((!accepted || is_hopeless) && !late && !limits_.empty() && attempts_ < most_attempts) {
-      begin_priced_at(*guess, report, deadline);
+      begin_priced_at(*guess, deadline);
       continue;
     }
     if (!accepted || is_hopeless) {

@@ -9,6 +9,7 @@
 #include "rhec/core/ocp/ocp.hpp"
 #include "rhec/core/ocp/solver.hpp"
 #include "rhec/core/ocp/start_search.hpp"
+#include "rhec/core/ocp/tracking_start.hpp"
 #include "rhec/core/qp/stage_qp_solver.hpp"
 
 namespace rhec::gn_rti {
@@ -87,7 +88,7 @@ class GnRti final : public Solver {
   bool search_along_step(Report& report, double residual, double& merit_after, Clock::time_point deadline) noexcept;
   bool correct_step(const StageQp& first, Report& report, Clock::time_point deadline) noexcept;
   // priced_steps.cpp
-  void begin_priced_at(const Iterate& guess, Report& report, Clock::time_point deadline) noexcept;
+  void begin_priced_at(const Iterate& guess, Clock::time_point deadline) noexcept;
   void begin_priced(double price) noexcept;
   bool is_violation_stuck(int iterations) noexcept;
   bool is_nearly_feasible() noexcept;
@@ -96,12 +97,6 @@ class GnRti final : public Solver {
   StageQpSolver::Outcome solve_priced(Report& report, Clock::time_point deadline) noexcept;
   bool take_priced_step(Report& report, double residual, double& merit_after, Clock::time_point deadline,
                         bool& feasible, bool& late) noexcept;
-  // tracking_start.cpp
-  struct StartQuality {
-    double violation, cost;
-  };
-  StartQuality quality_of(const Iterate& iterate) noexcept;
-  bool find_tracking_start(const Iterate& guess, Report& report, Clock::time_point deadline) noexcept;
 
   Options options_;
   const Ocp* ocp_ = nullptr;
@@ -135,8 +130,9 @@ class GnRti final : public Solver {
   // Where limits seem impossible to meet.
   StartSearch search_;
   Iterate other_start_;
-  Iterate tracking_;
-  bool has_tracking_ = false;
+  TrackingStart tracking_;
+  Iterate tracking_start_;
+  bool has_tracking_start_ = false;
 };
 
 }  // namespace rhec::gn_rti

@@ -6,6 +6,7 @@
 
 #include "rhec/core/qp/kkt.hpp"
 #include "rhec/core/qp/stage_qp_solver.hpp"
+#include "support/active_set_attempt.hpp"
 #include "support/qp_conditions.hpp"
 
 namespace rhec {

@@ -15,7 +15,7 @@
 #include "rhec/sim/problems/problem_file.hpp"
 
 namespace rhec {
-namespace tracking_start_test {
+namespace priced_steps_unstable_test {
 
 /// x' = growth x + u + 0.5 x u follows a sine, with |x + u / 2| <= side and x^2 - u <= 2 + side, which cost 10 each.
 std::string line(double growth, double side) {
@@ -40,7 +40,7 @@ std::string line(double growth, double side) {
       growth, intervals, x, u, fmt::join(nothing, ", "), fmt::join(lower, ", "), fmt::join(upper, ", "));
 }
 
-TEST(TrackingStart, IsWhereUnstableVehiclesBeginAgain) {
+TEST(PricedStepsUnstable, BeginAtARegulatorsTrajectory) {
   struct Case {
     double growth, side;
   };
@@ -66,5 +66,5 @@ TEST(TrackingStart, IsWhereUnstableVehiclesBeginAgain) {
   }
 }
 
-}  // namespace tracking_start_test
+}  // namespace priced_steps_unstable_test
 }  // namespace rhec
