@@ -5,6 +5,7 @@
 
 #include "limit_checks.hpp"
 #include "rhec/core/base/assertion.hpp"
+#include "rhec/core/base/infinity.hpp"
 #include "rhec/core/qp/stage_checks.hpp"
 #include "tolerances.hpp"
 
@@ -21,6 +22,8 @@ constexpr StageQpSolver::Accuracy ready_to_polish{1e-8, 1e-7};
 constexpr StageQpSolver::Accuracy ready_with_limits{1e-6, 1e-5};
 // If polishing does not settle, the interior-point method itself must be accurate.
 constexpr StageQpSolver::Accuracy on_its_own{1e-12, 1e-10};
+// The KKT residual that refining should reach, and what is enough.
+constexpr double refined_residual = 1e-10, acceptable_residual = 1e-8;
 
 /// Whether a QP is convexified before anything else: the last one was not convex, each has to be cheap, and it is not
 /// the turn of an augmentation.
@@ -41,6 +44,7 @@ StageQpSolver::StageQpSolver(const Capacity& capacity)
   if (capacity.limits > 0) {
     barrier_ = StageQp(capacity);
     augmented_ = guessed_ = ActiveSet(capacity);
+    increment_ = refined_ = interior_ = Iterate(capacity);
   }
   for (auto* v : {&diagonal_, &h_}) v->assign(nodes * capacity.row(), 0.0);
 }
@@ -152,7 +156,7 @@ bool StageQpSolver::try_active_sets(const StageQp& qp, Iterate& step, int rounds
 
 StageQpSolver::Outcome StageQpSolver::solve(const StageQp& qp, Iterate& step, Clock::time_point deadline) noexcept {
   RHEC_ASSERT(qp.capacity() == capacity_ && step.capacity() == capacity_, "a QP and a step of the capacity");
-  is_dual_ = is_convexified_ = false;
+  is_dual_ = is_convexified_ = is_refined_ = false;
   if (qp.has_limits()) return solve_limited(qp, step, deadline);
   if (!factored_ && !prepared_) prepare(qp);
   if (factored_) {
@@ -201,7 +205,11 @@ StageQpSolver::Outcome StageQpSolver::solve_limited(const StageQp& qp, Iterate& 
     prepare_changes(convex, is_factored);
     outcome = solve_from_guess(convex, step, deadline);
   }
-  if (outcome == DualActiveSet::Outcome::solved) return Outcome::active_set;
+  if (outcome == DualActiveSet::Outcome::solved) {
+    // Over long unstable horizons what the dual method leaves is more than rounding.
+    if (!is_cheap_) refine(solved(qp), step, acceptable_residual, deadline);
+    return Outcome::active_set;
+  }
   if (outcome == DualActiveSet::Outcome::out_of_time) return Outcome::out_of_time;
   return solve_robustly(qp, step, deadline);
 }
@@ -221,7 +229,7 @@ DualActiveSet::Outcome StageQpSolver::solve_from_guess(const StageQp& qp, Iterat
 
 StageQpSolver::Outcome StageQpSolver::solve_by_interior_point(const StageQp& qp, Iterate& step,
                                                               Clock::time_point deadline) noexcept {
-  is_dual_ = is_convexified_ = false;
+  is_dual_ = is_convexified_ = is_refined_ = false;
   return solve_robustly(qp, step, deadline);
 }
 
@@ -237,13 +245,25 @@ StageQpSolver::Outcome StageQpSolver::solve_robustly(const StageQp& given, Itera
   // The active set of the interior-point method, kept only if it leads to the exact solution.
   take_interior_set();
   factored_ = false;
-  if (polish(qp, step, deadline)) return Outcome::interior_point;
+  if (qp.has_limits()) interior_ = step;
+  if (polish(qp, step, deadline) &&
+      (!qp.has_limits() || refine(qp, step, refined_residual, deadline) <= acceptable_residual))
+    return Outcome::interior_point;
+  // Sets that are too large for the dual method, and those that depend on each other, are refined.
+  double residual = infinity;
+  if (qp.has_limits() && !out_of_time_) {
+    std::swap(step, interior_);
+    residual = refine(qp, step, refined_residual, deadline);
+    if (residual <= acceptable_residual) return Outcome::interior_point;
+    interior_ = step;
+  }
   // Polishing has overwritten the step. If rounding prevents the higher accuracy, repeat the first run.
   factored_ = false;
   bool is_accurate = true;
   if (!out_of_time_ && !interior_point(qp, step, on_its_own, deadline) && !out_of_time_)
     is_accurate = interior_point(qp, step, ready_to_polish, deadline);
   if (!is_accurate && !out_of_time_ && qp.has_limits()) interior_point(qp, step, ready_with_limits, deadline);
+  if (qp.has_limits() && !out_of_time_ && !(refine(qp, step, refined_residual, deadline) < residual)) step = interior_;
   return out_of_time_ ? Outcome::out_of_time : Outcome::interior_point;
 }
 

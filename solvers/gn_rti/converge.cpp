@@ -33,6 +33,12 @@ constexpr double short_step = 0.2, halved = 0.5;
 constexpr int most_short_steps = 8;
 // How often steps at a price begin at the guess.
 constexpr int most_attempts = 2;
+// Where a step changes less than this share of the merit, and the residual stays above the second share of what it was,
+// it is rounding that keeps it there.
+constexpr double settled_merit = 1e-10, little_progress = 0.1;
+constexpr int most_refinements = 5, most_rounds = 5;
+// What a QP is refined to, relative to the tolerance.
+constexpr double enough_refined = 1e-2;
 // How often penalties fall.
 constexpr int most_penalty_cuts = 20;
 
@@ -281,12 +287,36 @@ bool GnRti::find_other_start(const Iterate& guess, bool is_feasible, Clock::time
   return search_.find_other(*ocp_, guess, best_, deadline, scratch_, other_start_);
 }
 
+/// Where steps no longer change the merit, and rounding in the QP's solution is what is left of the residual: takes it
+/// from the multipliers, and from the step that they lead to. False if that does not halve the residual of `best_`.
+bool GnRti::refine(Report& report, double residual, Clock::time_point deadline) noexcept {
+  bool has_refined = false;
+  for (int round = 0; round < most_rounds && residual > options_.tolerance && !is_past(deadline); ++round) {
+    step_ = best_;
+    for (int i = 0; i <= ocp_->intervals(); ++i) std::fill_n(step_.row(i), ocp_->capacity().row(), 0.0);
+    const int before = qp_solver_.factorisations();
+    const double of_qp = qp_solver_.refine(linearisation_->qp(), step_, enough_refined * options_.tolerance, deadline);
+    report.factorisations += qp_solver_.factorisations() - before;
+    if (!std::isfinite(of_qp)) break;
+    add_step(best_, 1.0, trial_);
+    linearise(trial_);
+    const double refined = kkt_residual(*qp_, trial_).largest();
+    if (!(refined < halved * residual)) break;
+    residual = refined;
+    has_refined = true;
+    std::swap(best_, trial_);
+  }
+  linearise(best_);
+  return has_refined;
+}
+
 void GnRti::begin_at(const Iterate& guess) noexcept {
   defect_penalty_ = bound_penalty_ = 0.0;
   was_elastic_ = is_priced_ = use_exact_ = false;
   attempts_ = 0;
   futile_ = 0;
   penalty_cuts_left_ = most_penalty_cuts;
+  first_price_ = 0.0;
   best_ = guess;
   // The line search does not vary a given initial state.
   if (ocp_->initial_state()) std::copy_n(ocp_->initial_state(), ocp_->state_count(0), best_.state(0));
@@ -301,6 +331,8 @@ Report GnRti::converge(Iterate& iterate, Clock::time_point deadline) noexcept {
   report.status = Status::iteration_limit;
   double least_residual = std::numeric_limits<double>::infinity(), last_residual = least_residual;
   double halved_residual = least_residual;
+  bool is_settled = false;
+  int refinements_left = most_refinements;
   int slow = 0, short_steps = 0, stagnant = 0, first_iteration = 0;
   for (;; ++report.iterations) {
     linearise(best_);
@@ -326,9 +358,22 @@ Report GnRti::converge(Iterate& iterate, Clock::time_point deadline) noexcept {
       }
     }
     least_residual = std::min(least_residual, residual);
+    if (!limits_.empty() && is_settled && residual > little_progress * last_residual && refinements_left > 0 &&
+        report.kkt.bound_violation <= std::sqrt(options_.tolerance)) {
+      --refinements_left;
+      is_settled = false;
+      // The iterate before may have had better multipliers.
+      const bool is_worse = last_residual < residual;
+      if (is_worse) {
+        std::swap(best_, trial_);
+        linearise(best_);
+      }
+      refine(report, is_worse ? last_residual : residual, deadline);
+      continue;
+    }
 
     if (!limits_.empty() && !is_priced_ && is_violation_stuck(report.iterations - first_iteration)) {
-      begin_priced_at(*guess);
+      begin_priced_at(*guess, deadline);
       continue;
     }
     // Damped steps do better than short ones, and than those of a Hessian that is not convex.
@@ -382,18 +427,24 @@ Report GnRti::converge(Iterate& iterate, Clock::time_point deadline) noexcept {
         accepted = true;
       }
     }
+    if (!accepted && !late && !limits_.empty() && residual < near_solution && refinements_left > 0) {
+      --refinements_left;
+      linearise(best_);
+      if (refine(report, residual, deadline)) continue;
+    }
     last_residual = residual;
     const bool is_hopeless = accepted && (is_futile() || (is_priced_ && !raise_price(merit_after)));
     // The least violation around one point need not be the least of all: from a guess that is left in another direction
     // there may be none.
     if ((!accepted || is_hopeless) && !late && !limits_.empty() && attempts_ < most_attempts) {
-      begin_priced_at(*guess);
+      begin_priced_at(*guess, deadline);
       continue;
     }
     if (!accepted || is_hopeless) {
       // A point that meets everything is no sign of infeasibility, whatever became of the QP there.
       const bool is_feasible_point = std::max(report.kkt.defect, report.kkt.bound_violation) <= options_.tolerance;
-      const bool is_violated = is_priced_ && !limits_.empty() && !is_nearly_feasible();
+      const bool is_violated =
+          is_priced_ && !limits_.empty() && costs_of_limits(best_).violation > std::sqrt(options_.tolerance);
       report.status = late                                                           ? Status::deadline
                       : !is_feasible_point && (accepted || is_violated || !feasible) ? Status::infeasible
                                                                                      : Status::stalled;
@@ -408,6 +459,7 @@ Report GnRti::converge(Iterate& iterate, Clock::time_point deadline) noexcept {
       continue;
     }
     short_steps = step_length_ < short_step ? short_steps + 1 : 0;
+    is_settled = step_length_ == 1.0 && std::abs(slope_) <= settled_merit * (1.0 + std::abs(merit_after));
     std::swap(best_, trial_);
   }
   const double objective = ocp_->evaluate(best_, nullptr, scratch_);

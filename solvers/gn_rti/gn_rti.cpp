@@ -86,7 +86,8 @@ void GnRti::setup(const Ocp& ocp) {
   qp_solver_ = StageQpSolver(capacity);
   for (Iterate* iterate : {&step_, &trial_, &best_, &other_trial_, &first_step_}) *iterate = Iterate(capacity);
   if (capacity.limits > 0) {
-    other_start_ = Iterate(capacity);
+    other_start_ = tracking_start_ = Iterate(capacity);
+    tracking_.setup(ocp);
     search_.setup(ocp);
   }
   scratch_.assign(ocp.scratch_size(), 0.0);

@@ -9,6 +9,7 @@
 #include "rhec/core/ocp/ocp.hpp"
 #include "rhec/core/ocp/solver.hpp"
 #include "rhec/core/ocp/start_search.hpp"
+#include "rhec/core/ocp/tracking_start.hpp"
 #include "rhec/core/qp/stage_qp_solver.hpp"
 
 namespace rhec::gn_rti {
@@ -78,6 +79,7 @@ class GnRti final : public Solver {
                                               Clock::time_point deadline) noexcept;
   void raise(double& penalty, double least) noexcept;
   bool is_futile() noexcept;
+  bool refine(Report& report, double residual, Clock::time_point deadline) noexcept;
   void begin_at(const Iterate& guess) noexcept;
   bool find_other_start(const Iterate& guess, bool is_feasible, Clock::time_point deadline) noexcept;
   StageQpSolver::Outcome solve_at_prices(Report& report, double& before, double& after,
@@ -86,7 +88,7 @@ class GnRti final : public Solver {
   bool search_along_step(Report& report, double residual, double& merit_after, Clock::time_point deadline) noexcept;
   bool correct_step(const StageQp& first, Report& report, Clock::time_point deadline) noexcept;
   // priced_steps.cpp
-  void begin_priced_at(const Iterate& guess) noexcept;
+  void begin_priced_at(const Iterate& guess, Clock::time_point deadline) noexcept;
   void begin_priced(double price) noexcept;
   bool is_violation_stuck(int iterations) noexcept;
   bool is_nearly_feasible() noexcept;
@@ -128,6 +130,9 @@ class GnRti final : public Solver {
   // Where limits seem impossible to meet.
   StartSearch search_;
   Iterate other_start_;
+  TrackingStart tracking_;
+  Iterate tracking_start_;
+  bool has_tracking_start_ = false;
 };
 
 }  // namespace rhec::gn_rti

@@ -68,8 +68,11 @@ bool GnRti::is_nearly_feasible() noexcept {
 }
 
 /// Begins again at the guess: steps that went astray may have led far away.
-void GnRti::begin_priced_at(const Iterate& guess) noexcept {
-  best_ = guess;
+void GnRti::begin_priced_at(const Iterate& guess, Clock::time_point deadline) noexcept {
+  if (attempts_ == 0)
+    has_tracking_start_ = !limits_.empty() && tracking_.find(*ocp_, guess, deadline, scratch_, tracking_start_);
+  best_ = has_tracking_start_ ? tracking_start_ : guess;
+  if (has_tracking_start_) first_violation_ = costs_of_limits(best_).violation;
   if (ocp_->initial_state()) std::copy_n(ocp_->initial_state(), ocp_->state_count(0), best_.state(0));
   begin_priced(0.0);
   first_price_ = attempts_++ == 0 ? low_price : high_price;

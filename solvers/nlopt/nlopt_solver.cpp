@@ -137,6 +137,7 @@ void NloptSolver::setup(const Ocp& ocp) {
   ocp_ = &ocp;
   problem_ = CondensedProblem(ocp);
   if (ocp.capacity().limits > 0) search_.setup(ocp);
+  tracking_.setup(ocp);
   qp_ = StageQp(ocp.capacity());
   scratch_.assign(ocp.scratch_size(), 0.0);
 }
@@ -180,6 +181,8 @@ Report NloptSolver::optimise(const Ocp& ocp, Iterate& iterate, Clock::time_point
   if (problem_.has_slacks()) problem_.move_to(problem_.with_fitting_slacks());
   Answer answer = assess(problem_.x());
   Status status = improve(ocp, answer, deadline);
+  if (status != Status::solved && status != Status::deadline)
+    status = improve_from_tracking(ocp, iterate, status, answer, deadline);
   search_.begin();
   const auto may_be_misled = [&] {
     return status == Status::infeasible || (status == Status::stalled && answer.violation > infeasible_beyond);
@@ -197,6 +200,22 @@ Report NloptSolver::optimise(const Ocp& ocp, Iterate& iterate, Clock::time_point
   report.kkt = problem_.residual();
   iterate = problem_.iterate();
   return report;
+}
+
+/// Simulations of an unstable vehicle may have led far away: another attempt, from a trajectory that a regulator keeps
+/// together, if that is better than the guess.
+Status NloptSolver::improve_from_tracking(const Ocp& ocp, const Iterate& guess, Status status, Answer& answer,
+                                          Clock::time_point deadline) {
+  Iterate start = guess;
+  if (iterations_left() <= 0 || !tracking_.find(ocp, guess, deadline, scratch_, start)) return status;
+  if (!problem_.move_to(problem_.read(start))) return status;
+  if (problem_.has_slacks()) problem_.move_to(problem_.with_fitting_slacks());
+  fallback_used_ = true;
+  Answer other = assess(problem_.x());
+  const Status second = improve(ocp, other, deadline);
+  if (second != Status::solved && !is_better(other, answer)) return status;
+  answer = std::move(other);
+  return second;
 }
 
 /// The answer becomes one at another start, if there is one.

@@ -7,6 +7,7 @@
 #include "nlopt_run.hpp"
 #include "rhec/core/ocp/solver.hpp"
 #include "rhec/core/ocp/start_search.hpp"
+#include "rhec/core/ocp/tracking_start.hpp"
 
 namespace rhec::nlopt {
 
@@ -51,6 +52,8 @@ class NloptSolver final : public Solver {
   Status attempt(const Ocp& ocp, Answer& answer, long quota, Clock::time_point deadline);
   Status restore_feasibility(const Ocp& ocp, Answer& answer, Clock::time_point deadline);
   bool find_start(const Ocp& ocp, const Iterate& iterate);
+  Status improve_from_tracking(const Ocp& ocp, const Iterate& guess, Status status, Answer& answer,
+                               Clock::time_point deadline);
   bool find_other_start(const Ocp& ocp, const Iterate& guess, Answer& answer, Clock::time_point deadline);
   Eigen::VectorXd within_bounds(const Eigen::VectorXd& x) const;
   Answer assess(const Eigen::VectorXd& x);
@@ -70,6 +73,7 @@ class NloptSolver final : public Solver {
   std::vector<double> scratch_;
   StageQp qp_;
   StartSearch search_;
+  TrackingStart tracking_;
   int factorisations_ = 0;
   long iterations_ = 0;
   long limit_ = 0;  ///< of the iterations, for the current attempt

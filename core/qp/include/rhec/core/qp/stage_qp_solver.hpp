@@ -46,12 +46,19 @@ class RHEC_EXPORT StageQpSolver {
   Outcome solve_by_interior_point(const StageQp& qp, Iterate& step,
                                   Clock::time_point deadline = Clock::time_point::max()) noexcept;
 
+  /// With limits: takes rounding from a solution, or from another primal-dual step close to one, whatever set is
+  /// active. Goes on until the KKT residual of the QP is at most `wanted`, or rounding is what is left of it; `step`
+  /// becomes the best. Returns its residual; infinite, and `step` as it was, where nothing could be done.
+  double refine(const StageQp& qp, Iterate& step, double wanted,
+                Clock::time_point deadline = Clock::time_point::max()) noexcept;
+
   /// The control of stage i by the policy of the last solution for a stage-state step. After `prepare_feedback`, with
   /// the same, unchanged `qp`.
   void prepare_feedback(const StageQp& qp) noexcept {
     if (is_dual_) dual_.complete_policy(solved(qp), riccati_);
   }
   void feedback(const StageQp& qp, int i, const double* state_step, double* control_step) noexcept {
+    if (is_refined_) return refined_feedback(i, state_step, control_step);
     riccati_.feedback(solved(qp), i, state_step, control_step);
   }
   /// Covariances from the QP's Hessian without bounds (Riccati::covariances), of all nodes or of the last one; false if
@@ -87,6 +94,9 @@ class RHEC_EXPORT StageQpSolver {
   bool augmentation_fits(const StageQp& qp, double relative) const noexcept;
   void shift_multipliers(const StageQp& qp, double relative, Iterate& step) const noexcept;
   bool may_augment() noexcept;
+  void augment_rows(const StageQp& qp, const Iterate& at, double relative_weight) noexcept;
+  void refined_feedback(int i, const double* state_step, double* control_step) noexcept;
+  void add_increment(const StageQp& qp, double relative_weight, Iterate& to) const noexcept;
   bool solve_augmented(const StageQp& qp, Iterate& step, Clock::time_point deadline) noexcept;
   void take_interior_set() noexcept;
   bool polish(const StageQp& qp, Iterate& step, Clock::time_point deadline) noexcept;
@@ -127,6 +137,8 @@ class RHEC_EXPORT StageQpSolver {
   ActiveSet augmented_, guessed_;  ///< with limits: the set for which the QP was augmented, and the first one
   StageQp convexified_;
   StageQp barrier_;  ///< with limits: the QP plus their barrier terms
+  Iterate increment_, refined_, interior_;
+  bool is_refined_ = false;  ///< the last solution is `refined_`
   bool factored_ = false;
   bool is_convexified_ = false;   ///< the QP is not convex and `convexified_` replaces it
   bool was_convexified_ = false;  ///< since `guess_from`
