@@ -1,10 +1,7 @@
-// Refinement of the solution of a stage QP with limits by augmented
-// Lagrangians.
+// Refinement of the solution of a stage QP with limits by augmented Lagrangians.
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <cstdio>
-#include <cstdlib>
 
 #include "limit_checks.hpp"
 #include "rhec/core/base/infinity.hpp"
@@ -16,16 +13,14 @@ namespace {
 
 constexpr int most_refinements = 20, most_futile_refinements = 3;
 constexpr double enough_less = 0.5;
-// Weights of rows relative to the curvature along them: they rise where a round
-// leaves more than a share of the violation.
+// Weights of rows relative to the curvature along them: they rise where a round leaves more than a share of the
+// violation.
 constexpr double first_weight = 1e4, heavier = 10.0, heaviest = 1e8;
 constexpr double violation_left = 0.1;
-// Entries of a Hessian's diagonal that are smaller than this share of the
-// largest of its stage count as this share.
+// Entries of a Hessian's diagonal that are smaller than this share of the largest of its stage count as this share.
 constexpr double least_share = 1e-10;
 
-/// What a row adds to the gradient, in units of the row, and to the curvature
-/// along it.
+/// What a row adds to the gradient, in units of the row, and to the curvature along it.
 struct Pull {
   double multiplier = 0.0, weight = 0.0;
 };
@@ -34,9 +29,8 @@ struct Slack {
   double linear = infinity, quadratic = 0.0;  ///< of a hard row
 };
 
-/// Of a row with a multiplier and the distances of its sides from its value:
-/// the side that it is at, -1 or +1, or beyond, -2 or +2, where a soft one
-/// gives way; 0 between.
+/// Of a row with a multiplier and the distances of its sides from its value: the side that it is at, -1 or +1, or
+/// beyond, -2 or +2, where a soft one gives way; 0 between.
 int side_of(double multiplier, double lower, double upper, double weight, const Slack& slack) noexcept {
   if (const double above = multiplier - weight * upper; above > 0.0) return above > slack.linear ? 2 : 1;
   if (const double below = multiplier - weight * lower; below < 0.0) return -below > slack.linear ? -2 : -1;
@@ -57,8 +51,8 @@ double multiplier_after(double multiplier, double lower, double upper, double we
   return pull_of(side_of(multiplier, lower, upper, weight, slack), multiplier, lower, upper, weight, slack).multiplier;
 }
 
-/// Visits all bounds and limits with their weights: of_bound(stage, place in
-/// the row, weight), of_limit(stage, r, weight).
+/// Visits all bounds and limits with their weights: of_bound(stage, place in the row, weight), of_limit(stage, r,
+/// weight).
 template <class OfBound, class OfLimit>
 void for_each_row(const StageQp& qp, double relative_weight, const OfBound& of_bound, const OfLimit& of_limit) {
   const int states = qp.capacity().states, stride = qp.stride();
@@ -115,10 +109,9 @@ void move_to(const StageQp& qp, const Iterate& at, StageQp& moved) noexcept {
 
 }  // namespace
 
-/// Writes to `barrier_`, which is the QP in steps from `at`, the Lagrangian's
-/// gradient in the place of the objective's, and rows at or beyond a side into
-/// the objective. Which these are is told by weights as small as the curvature,
-/// so that a disturbance of a row's value does not decide it alone.
+/// Writes to `barrier_`, which is the QP in steps from `at`, the Lagrangian's gradient in the place of the objective's,
+/// and rows at or beyond a side into the objective. Which these are is told by weights as small as the curvature, so
+/// that a disturbance of a row's value does not decide it alone.
 void StageQpSolver::augment_rows(const StageQp& qp, const Iterate& at, double relative_weight) noexcept {
   const int stride = qp.stride();
   for (int i = 0; i <= qp.intervals(); ++i) {
@@ -177,10 +170,9 @@ void StageQpSolver::add_increment(const StageQp& qp, double relative_weight, Ite
   }
 }
 
-/// The method of multipliers (Nocedal & Wright 2006, section 17.4): rows are in
-/// the objective, so that a Riccati recursion solves what is left, however many
-/// of them are active and depend on each other; and what it solves for is what
-/// has still to be added, so that its rounding is relative to that.
+/// The method of multipliers (Nocedal & Wright 2006, section 17.4): rows are in the objective, so that a Riccati
+/// recursion solves what is left, however many of them are active and depend on each other; and what it solves for is
+/// what has still to be added, so that its rounding is relative to that.
 double StageQpSolver::refine(const StageQp& qp, Iterate& step, double wanted, Clock::time_point deadline) noexcept {
   if (!qp.has_limits()) return infinity;
   barrier_ = qp;
