@@ -339,7 +339,7 @@ TEST(ProblemRecord, OptionsKeepTheirMeaning) {
 }
 
 // It cannot stop before the wall that it drives against.
-constexpr const char* impossible = "{bounds: {u1: [4, 20], x_pos: [-20, 6]}, controller: {speed_bound_factor: .inf}}";
+constexpr const char* impossible = "{bounds: {u1: [4, 20], x_pos: [-20, 4]}, controller: {speed_bound_factor: .inf}}";
 
 /// What a run solved, solved again from its line alone.
 class Replayed : public ::testing::TestWithParam<const char*> {};
