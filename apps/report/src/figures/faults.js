@@ -7,6 +7,7 @@ const groups = {
   clock: "Clocks that are set",
 };
 const PANEL = 190, ROOM = 60, ROW = 20;  // heights of a panel and a row; room for the numbers of an axis [px]
+const INDENT = 12, BOLD = 0.62;          // of a panel's title [px]; width of its letters by their height
 
 export function faultFigures({campaign}) {
   const names = Object.keys(groups).filter((group) => campaign.kinds.some((kind) => kind.group === group));
@@ -49,7 +50,8 @@ function curveFigure(campaign, group) {
         const column = k % columns, y = top + Math.floor(k / columns) * PANEL;
         const frame = addFrame(option, look, {top: y + 20, height: PANEL - 66, width, left: column * wide + ROOM, right: width - (column + 1) * wide + 12,
           x: {min: 0, max: longest({samples})}, y: {type: "log", name: column === 0 ? "error [m]" : "", ...ends}});
-        option.graphic = (option.graphic || []).concat({type: "text", silent: true, x: column * wide + ROOM, y, style: {text: kind.name, fill: look.text, font: `600 ${look.fontSize}px ${look.font}`}});
+        const size = Math.min(look.fontSize, (wide - 2 * INDENT) / (BOLD * kind.name.length));
+        option.graphic = (option.graphic || []).concat({type: "text", silent: true, x: column * wide + INDENT, y, style: {text: kind.name, fill: look.text, font: `600 ${size.toFixed(1)}px ${look.font}`}});
         addShapes(option, frame, "window", [window, ends.min], (at) => {
           const [x, bottom] = at([window, ends.min]), [, above] = at([window, ends.max]);
           return [{type: "line", shape: {x1: x, y1: bottom, x2: x, y2: above}, style: {stroke: look.line}}];
