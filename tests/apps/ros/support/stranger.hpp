@@ -1,5 +1,7 @@
 #pragma once
 
+#include <fcntl.h>
+#include <sys/file.h>
 #include <unistd.h>
 
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
@@ -20,10 +22,12 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
+#include <stdexcept>
 #include <string>
 #include <thread>
 #include <utility>
@@ -106,6 +110,34 @@ bool becomes(const Condition& condition) {
   return true;
 }
 
+/// A domain that no other test uses meanwhile: participants of another one that come and go make Fast DDS fail an
+/// assertion of its own. tests/cli/ros.py has the domains below, and Linux hands out the ports of those above.
+class Domain {
+ public:
+  Domain() {
+    constexpr std::uint32_t first = 70, count = 32;
+    const auto start = static_cast<std::uint32_t>(getpid());
+    for (std::uint32_t i = 0; file_ < 0 && i < count; ++i) {
+      number_ = first + (start + i) % count;
+      const std::string name = "rhec_test_domain_" + std::to_string(getuid()) + "_" + std::to_string(number_);
+      const std::filesystem::path path = std::filesystem::temp_directory_path() / name;
+      file_ = open(path.c_str(), O_CREAT | O_RDWR | O_CLOEXEC, 0600);
+      if (file_ < 0 || flock(file_, LOCK_EX | LOCK_NB) == 0) continue;
+      close(file_);
+      file_ = -1;
+    }
+    if (file_ < 0) throw std::runtime_error("no domain is free, or the folder for temporary files is not writable");
+  }
+  ~Domain() { close(file_); }
+  Domain(const Domain&) = delete;
+  Domain& operator=(const Domain&) = delete;
+  std::uint32_t number() const noexcept { return number_; }
+
+ private:
+  std::uint32_t number_ = 0;
+  int file_ = -1;
+};
+
 class StrangerTest : public testing::Test {
  protected:
   void SetUp() override {
@@ -152,9 +184,8 @@ class StrangerTest : public testing::Test {
     return bytes;
   }
 
-  // Tests run at the same time; tests/cli/ros.py has the domains below, and Linux hands out the ports of those above
-  // 101.
-  const std::uint32_t domain_ = 70 + static_cast<std::uint32_t>(getpid()) % 32;
+  const Domain leased_;
+  const std::uint32_t domain_ = leased_.number();
   Discovery discovery_;
   dds::DomainParticipant* stranger_ = nullptr;
 };
