@@ -96,18 +96,22 @@ SensorWatch::Finding SensorWatch::accuse(const Suspicion& suspicion, const Recor
   held_count_ = memory.jump_count = 0;
   for (int ago = suspicion.ago; ago-- > 0 && held_count_ < std::ssize(held_);) {
     const Memory::Entry& entry = memory.entry(ago);
-    held_[held_count_] = {entry.time, entry.rejected};
-    for (std::size_t j = 0; j < raw_.size(); ++j)
-      if (!std::isnan(entry.rejected[j])) {
-        ++held_count_;
-        break;
-      }
+    const double* const rejected = entry.rejected.measured().values;
+    if (std::all_of(rejected, rejected + raw_.size(), [](double each) { return std::isnan(each); })) continue;
+    Held& held = held_[held_count_++];
+    held.time = entry.time;
+    held.outputs = entry.rejected;
   }
   const double since = memory.entry(suspicion.ago).time;
   memory.released = {since, since, memory.retracted.data()};
   memory.since_release = std::numeric_limits<int>::max();
   replay_without(suspicion, own_->filter, true);
-  for (const int j : sensors_[suspicion.sensor].outputs) raw_[static_cast<std::size_t>(j)] = Memory::unknown;
+  bool was_used = false;
+  for (const int j : sensors_[suspicion.sensor].outputs) {
+    double& value = raw_[static_cast<std::size_t>(j)];
+    was_used = was_used || (records_[suspicion.sensor].failures == 0 && !std::isnan(value));
+    value = Memory::unknown;
+  }
   own_->filter.update_as_expected(weighed(raw_.data()));
   memory.offsets->forget_onsets();
   acquit(outputs);
@@ -117,13 +121,9 @@ SensorWatch::Finding SensorWatch::accuse(const Suspicion& suspicion, const Recor
   disputed_samples_ = suspicion.ago;
   std::fill(records_.begin(), records_.end(), Record{});
   records_[suspicion.sensor] = error;
-  std::uint32_t& findings = findings_[suspicion.sensor];
-  SensorHealth& state = states_[suspicion.sensor];
-  if (!suspicion.anew) {
-    --state.accepted;
-    ++state.rejected;
-  }
-  findings |= reason::rejected;
+  findings_[suspicion.sensor] |= reason::rejected;
+  states_[suspicion.sensor].accepted -= was_used;
+  states_[suspicion.sensor].rejected += was_used;
   return {.release = true, .retract = true};
 }
 

@@ -56,10 +56,10 @@ class RHEC_EXPORT SensorWatch {
 
   /// What an estimator has to do beyond using what is left of the outputs.
   struct Finding {
-    bool release = false;  ///< slip has jumped (`jumps`), and measurements that were held back are right (`held`)
+    bool release = false;  ///< measurements that were held back are right (`held`), and slip has jumped (`jumps`)
     /// The estimate has to go on from `mean` and `covariance`, which contain this measurement.
     bool rebase = false;
-    bool retract = false;  ///< slip had not jumped: see `retraction`
+    bool retract = false;  ///< what was used was wrong, and slip had not jumped: see `retraction`
   };
   /// Judges outputs (n_y, NaN where missing; weights as in Measured) of a time [s]; those not to be used become NaN.
   Finding judge(double time, double* outputs, const double* weights = nullptr) noexcept;
