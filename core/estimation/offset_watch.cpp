@@ -185,26 +185,38 @@ void OffsetWatch::note(const WalkingFilter& filter, int output, const KalmanFilt
   }
 }
 
+/// What the constant of a lane is known to have done to an innovation is taken out, and what is not known of it added.
+void OffsetWatch::widen_by(const WalkingFilter& filter, const Sensor& sensor, const double* outputs, int output,
+                           int lane, Innovation& innovation) const noexcept {
+  const auto sensitivity = sensitivities_.columns.col(lane);
+  const Constant error = constant(lane);
+  Innovation::OfSensor<1> by_offset(innovation.value.size());
+  Eigen::Index a = 0;
+  for (const int j : sensor.outputs) {
+    if (std::isnan(outputs[j])) continue;
+    double g = j == output ? 1.0 : 0.0;
+    for (int c = 0; c < filter.model().state_count(); ++c) g -= filter.derivative(j, c) * sensitivity[c];
+    by_offset[a++] = g;
+  }
+  innovation.value -= by_offset * error.value();
+  innovation.covariance += by_offset * by_offset.transpose() / error.information;
+}
+
 void OffsetWatch::widen(const WalkingFilter& filter, const Sensor& sensor, const double* outputs,
                         Innovation& innovation) noexcept {
   bool is_wider = false;
   for (std::size_t k = 0; k < outputs_.size(); ++k) {
     if (!known_[k].is_off) continue;
     is_wider = true;
-    const auto sensitivity = sensitivities_.columns.col(lane_of_known(k));
-    const Constant error = constant(lane_of_known(k));
-    Innovation::OfSensor<1> by_offset(innovation.value.size());
-    Eigen::Index a = 0;
-    for (const int j : sensor.outputs) {
-      if (std::isnan(outputs[j])) continue;
-      double g = j == outputs_[k] ? 1.0 : 0.0;
-      for (int c = 0; c < filter.model().state_count(); ++c) g -= filter.derivative(j, c) * sensitivity[c];
-      by_offset[a++] = g;
-    }
-    innovation.value -= by_offset * error.value();
-    innovation.covariance += by_offset * by_offset.transpose() / error.information;
+    widen_by(filter, sensor, outputs, outputs_[k], lane_of_known(k), innovation);
   }
   if (is_wider) innovation.nis = squared_size(innovation.value, innovation.covariance);
+}
+
+void OffsetWatch::widen_by_candidate(const WalkingFilter& filter, const Sensor& sensor, const double* outputs,
+                                     Innovation& innovation) const noexcept {
+  widen_by(filter, sensor, outputs, outputs_[onsets_[candidate_].watched], candidate_, innovation);
+  innovation.nis = squared_size(innovation.value, innovation.covariance);
 }
 
 /// One output after the other, as the filter has done it: innovations of a sample are then independent.
@@ -256,13 +268,17 @@ void OffsetWatch::take(const WalkingFilter& filter, double excess) noexcept {
 
 void OffsetWatch::adopt_suspected(WalkingFilter& filter) noexcept {
   if (refuted_ >= 0) return withdraw(static_cast<std::size_t>(refuted_), filter);
-  const Constant found = constant(suspect_);
-  const auto sensitivity = sensitivities_.columns.col(suspect_);
+  adopt_lane(suspect_, filter);
+}
+
+void OffsetWatch::adopt_lane(int lane, WalkingFilter& filter) noexcept {
+  const Constant found = constant(lane);
+  const auto sensitivity = sensitivities_.columns.col(lane);
   filter.mean() -= sensitivity * found.value();
   clip(filter.mean().tail(std::ssize(parameter_lower_)));
   add_square(sensitivity, 1.0 / found.information, filter.covariance());
   const double least = found.value() / most_certain;
-  adopt(outputs_[onsets_[suspect_].watched], found.value(), std::max(1.0 / found.information, least * least));
+  adopt(outputs_[onsets_[lane].watched], found.value(), std::max(1.0 / found.information, least * least));
 }
 
 void OffsetWatch::adopt(int output, double change, double variance) noexcept {

@@ -42,6 +42,10 @@ class OffsetWatch {
   KalmanFilter::Deviations& sensitivities() noexcept { return sensitivities_; }
   /// What is not known of offsets that were adopted makes an innovation of a sensor's outputs (n_y) wider.
   void widen(const WalkingFilter& filter, const Sensor& sensor, const double* outputs, Innovation& innovation) noexcept;
+  /// The same of the offset that is more probable than not. Once it counts, an innovation may be explained that nothing
+  /// else explains.
+  void widen_by_candidate(const WalkingFilter& filter, const Sensor& sensor, const double* outputs,
+                          Innovation& innovation) const noexcept;
   /// What the filter has just used of the outputs. `excess`: squares of innovations have been so many times what was
   /// expected.
   void take(const WalkingFilter& filter, double excess) noexcept;
@@ -49,6 +53,8 @@ class OffsetWatch {
   bool has_suspect() const noexcept { return suspect_ >= 0 || refuted_ >= 0; }
   /// Adopts that offset; the filter becomes what it would be without it.
   void adopt_suspected(WalkingFilter& filter) noexcept;
+  /// The same of one that is probable, where something else says so, too.
+  void adopt_candidate(WalkingFilter& filter) noexcept { adopt_lane(candidate_, filter); }
   /// Adopts that the offset of an output has changed by this much, known with a variance.
   void adopt(int output, double change, double variance) noexcept;
 
@@ -69,8 +75,10 @@ class OffsetWatch {
   bool has_any() const noexcept;
   /// Whether estimates are to be refined: there is one, or one is not improbable.
   bool is_in_doubt() const noexcept { return candidate_ >= 0 || has_any(); }
-  /// Whether one that has not said enough yet is more probable than not.
-  bool is_probable() const noexcept { return candidate_ >= 0 && probability_ > 0.5; }
+  /// The output of one that has not said enough yet, and is more probable than not; -1: none.
+  int probable() const noexcept {
+    return candidate_ >= 0 && probability_ > 0.5 ? outputs_[static_cast<std::size_t>(onsets_[candidate_].watched)] : -1;
+  }
   bool has_recent() const noexcept;  ///< one that was adopted of late
   /// Gives an estimate of [x; p] the mean and the covariance that it has if offsets are not known better than they are.
   /// One that is not adopted yet, and the other one of two outputs of which one is off, count with their probability:
@@ -111,6 +119,9 @@ class OffsetWatch {
   void begin(int watched, double excess) noexcept;
   bool has_young(int watched) const noexcept;
   void note(const WalkingFilter& filter, int output, const KalmanFilter::Use& use) noexcept;
+  void adopt_lane(int lane, WalkingFilter& filter) noexcept;
+  void widen_by(const WalkingFilter& filter, const Sensor& sensor, const double* outputs, int output, int lane,
+                Innovation& innovation) const noexcept;
   bool is_significant(std::size_t watched) const noexcept;
   void withdraw(std::size_t watched, WalkingFilter& filter) noexcept;
   void find_used_lanes() noexcept;

@@ -179,4 +179,23 @@ bool SensorWatch::consider_other(const double* outputs, Finding& finding) noexce
   return false;
 }
 
+/// The output whose offset is more probable than not, and explains a position that has failed more than once: both
+/// together say enough. -1: none.
+int SensorWatch::offset_in_dispute() noexcept {
+  WalkingFilter& filter = own_->filter;
+  const OffsetWatch& offsets = *memory_->offsets;
+  const int output = offsets.probable();
+  if (!is_disputed_ || disputed_samples_ > looked_for || output < 0 || sees_position(output)) return -1;
+  bool is_position_explained = false;
+  for (std::size_t s = 0; s < sensors_.size(); ++s) {
+    const bool is_rejected = (findings_[s] & reason::rejected) != 0;
+    if (!is_rejected || !filter.innovation(sensors_[s], weighed(raw_.data()), scratch_)) continue;
+    offsets.widen_by_candidate(filter, sensors_[s], raw_.data(), scratch_);
+    const bool passes = scratch_.nis <= close_limits_[static_cast<std::size_t>(scratch_.value.size())];
+    if (!passes || !sees_position(sensors_[s].outputs)) return -1;
+    is_position_explained = true;
+  }
+  return is_position_explained ? output : -1;
+}
+
 }  // namespace rhec

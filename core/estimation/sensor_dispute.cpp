@@ -230,7 +230,7 @@ bool SensorWatch::may_follow() const noexcept {
 /// what new slip alone does not explain. What has been measured since is then used anew, from before that. False if
 /// this does not explain what is disputed either.
 bool SensorWatch::consider_slip_before() noexcept {
-  if (disputed_samples_ != 1 || !is_position_disputed() || memory_->offsets->is_probable()) return false;
+  if (disputed_samples_ != 1 || !is_position_disputed() || memory_->offsets->probable() >= 0) return false;
   // After a gap there is little to be used anew.
   if (std::ranges::any_of(records_, [](const Record& each) { return each.after_gap; })) return false;
   const auto entry = [this](int ago) -> const Memory::Entry& { return memory_->entry(ago); };

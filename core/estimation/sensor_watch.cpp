@@ -33,7 +33,7 @@ constexpr double much_nearer = 9.0;
 constexpr double most_excess = 100.0, excess_memory = 500.0;
 // Standard deviations by which a sensor has to be off, in the sum of many samples. It is tested at every one of them,
 // with all times since when it may be so.
-constexpr double offset_gate = 7.5;
+constexpr double offset_gate = 7.0;
 // Slip at its bound, of which measurements ask for more by this many of its standard deviations in all, beside so many
 // a sample, does not explain how the vehicle moves.
 constexpr double impossibly_beyond = 4.0, usually_beyond = 0.75;
@@ -312,6 +312,7 @@ SensorWatch::Finding SensorWatch::judge(double time, double* outputs, const doub
     }
     if (is_blind_) test_inputs(raw_.data());
     unplaced_samples_ = is_placed ? 0 : unplaced_samples_ + is_disputed;
+    const int told = is_disputed ? offset_in_dispute() : -1;
     if (is_disputed) {
       if (is_disputed_ && is_back) end_dispute();
       finding = settle(time, outputs);
@@ -361,8 +362,15 @@ SensorWatch::Finding SensorWatch::judge(double time, double* outputs, const doub
         finding.rebase = true;
       }
       memory_->offsets->take(filter, std::max(1.0, *std::ranges::max_element(excesses_)));
-      if (!is_disputed && memory_->offsets->has_suspect()) {
+      const bool is_told = told >= 0 && memory_->offsets->probable() == told;
+      const bool is_found = !is_disputed && memory_->offsets->has_suspect();
+      if (is_told) {
+        memory_->offsets->adopt_candidate(filter);
+        std::fill(records_.begin(), records_.end(), Record{});
+      } else if (is_found) {
         memory_->offsets->adopt_suspected(filter);
+      }
+      if (is_told || is_found) {
         end_dispute();
         finding.rebase = true;
       }

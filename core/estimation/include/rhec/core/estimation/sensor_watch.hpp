@@ -133,6 +133,7 @@ class RHEC_EXPORT SensorWatch {
   void find_stuck(double* outputs) noexcept;
   void note_motion(double duration, const double* inputs) noexcept;
   bool is_searching() const noexcept;
+  int offset_in_dispute() noexcept;
   void start_search(const double* outputs) noexcept;
   void search_from(WalkingFilter& filter, HeadingSearch& search) noexcept;
   void think_again() noexcept;
