@@ -57,9 +57,7 @@ bool SensorWatch::replay_without(const Suspicion& suspicion, WalkingFilter& filt
       if (sees_position(each.outputs) && filter.innovation(each, positions, scratch_))
         are_explained = are_explained && scratch_.nis <= close_limits_[static_cast<std::size_t>(scratch_.value.size())];
   };
-  const Memory::Entry& first = memory.entry(suspicion.ago);
-  filter.mean() = first.mean;
-  filter.covariance() = first.covariance;
+  memory.go_back(suspicion.ago, filter);
   if (suspicion.anew) {
     filter.restart_parameters(setup_.parameter_sigmas);
     const std::vector<Variable>& states = filter.model().description().states;
@@ -69,20 +67,17 @@ bool SensorWatch::replay_without(const Suspicion& suspicion, WalkingFilter& filt
       filter.covariance()(i, i) = std::max(filter.covariance()(i, i), sigma * sigma);
     }
   }
-  for (int ago = suspicion.ago; ago > 0; --ago) {
-    Memory::Entry& next = memory.entry(ago - 1);
-    filter.predict(memory.entry(ago).inputs.data(), next.time - memory.entry(ago).time);
-    compare(next.outputs.measured(), next.rejected.measured());
-    memory.replayed = next.outputs;
+  memory.replay(suspicion.ago, filter, [&](Memory::Entry& entry) {
+    compare(entry.outputs.measured(), entry.rejected.measured());
+    memory.replayed = entry.outputs;
     memory.replayed.remove(memory.retracted.data());
-    memory.replayed.add(next.rejected.measured());
+    memory.replayed.add(entry.rejected.measured());
     filter.update_as_expected(memory.replayed.measured());
-    if (!change) continue;
-    std::swap(next.outputs, memory.replayed);
-    next.rejected.clear();
-    copy_numbers(filter.mean(), next.mean);
-    copy_numbers(filter.covariance(), next.covariance);
-  }
+    if (!change) return;
+    std::swap(entry.outputs, memory.replayed);
+    entry.rejected.clear();
+    entry.note(filter);
+  });
   filter.predict(input_.data(), memory.duration);
   compare(weighed(raw_.data()), weighed(raw_.data()));
   return is_off && are_explained;

@@ -151,16 +151,12 @@ bool SensorWatch::retract_slip() noexcept {
     for (const int j : sensors_[s].outputs)
       memory.retracted[j] = (findings_[s] & reason::rejected) ? raw_[j] : Memory::unknown;
   WalkingFilter& filter = own_->filter;
-  filter.mean() = memory.entry(ago).mean;
-  filter.covariance() = memory.entry(ago).covariance;
-  for (; ago > 0; --ago) {
-    Memory::Entry& next = memory.entry(ago - 1);
-    filter.predict(memory.entry(ago).inputs.data(), next.time - memory.entry(ago).time);
-    next.outputs.remove(memory.retracted.data());
-    filter.update(next.outputs.measured());
-    copy_numbers(filter.mean(), next.mean);
-    copy_numbers(filter.covariance(), next.covariance);
-  }
+  memory.go_back(ago, filter);
+  memory.replay(ago, filter, [&](Memory::Entry& entry) {
+    entry.outputs.remove(memory.retracted.data());
+    filter.update(entry.outputs.measured());
+    entry.note(filter);
+  });
   memory.before_mean = filter.mean();
   memory.before_covariance = filter.covariance();
   filter.predict(input_.data(), memory.duration);
@@ -233,21 +229,16 @@ bool SensorWatch::consider_slip_before() noexcept {
   if (disputed_samples_ != 1 || !is_position_disputed() || memory_->offsets->probable() >= 0) return false;
   // After a gap there is little to be used anew.
   if (std::ranges::any_of(records_, [](const Record& each) { return each.after_gap; })) return false;
-  const auto entry = [this](int ago) -> const Memory::Entry& { return memory_->entry(ago); };
   for (const int positions : changed_before) {
     const int back = memory_->samples_with_positions(positions);
     if (back == 0) return false;
     WalkingFilter& filter = slip_->filter;
-    filter.mean() = entry(back).mean;
-    filter.covariance() = entry(back).covariance;
+    memory_->go_back(back, filter);
     filter.restart_parameters(setup_.parameter_sigmas);
-    for (int ago = back; ago > 0; --ago) {
-      filter.predict(entry(ago).inputs.data(), entry(ago - 1).time - entry(ago).time);
-      filter.update(entry(ago - 1).outputs.measured());
-    }
+    memory_->replay(back, filter, [&](const Memory::Entry& entry) { filter.update(entry.outputs.measured()); });
     filter.predict(input_.data(), memory_->duration);
     if (!is_within_bounds(filter.mean()) || !fits(filter, raw_.data())) continue;
-    memory_->jumps[0] = entry(back).time;
+    memory_->jumps[0] = memory_->entry(back).time;
     return true;
   }
   return false;

@@ -547,8 +547,7 @@ void SensorWatch::remember(double time, const double* outputs) noexcept {
   ++memory.connected;
   Memory::Entry& entry = memory.entries[memory.newest];
   entry.time = time;
-  copy_numbers(own_->filter.mean(), entry.mean);
-  copy_numbers(own_->filter.covariance(), entry.covariance);
+  entry.note(own_->filter);
   entry.outputs.assign(weighed(outputs));
   entry.rejected.assign(weighed(raw_.data()));
   entry.rejected.remove(outputs);

@@ -77,11 +77,30 @@ struct SensorWatch::Memory {
     MeasuredOutputs outputs;     ///< that were used
     MeasuredOutputs rejected;    ///< positions that were not
     bool has_position = false;   ///< of either kind
+
+    void note(const WalkingFilter& filter) noexcept {
+      copy_numbers(filter.mean(), mean);
+      copy_numbers(filter.covariance(), covariance);
+    }
   };
   std::vector<Entry> entries{remembered_samples};
   std::size_t newest = 0;
   Entry& entry(int ago) noexcept {
     return entries[(newest + entries.size() - static_cast<std::size_t>(ago)) % entries.size()];
+  }
+  /// A filter that knows what was known so many samples ago, and perhaps less, goes through what has been measured
+  /// since: `take_in(entry)` at each of these samples, once it has been predicted.
+  template <class TakeIn>
+  void replay(int since, WalkingFilter& filter, TakeIn take_in) noexcept {
+    for (int ago = since; ago > 0; --ago) {
+      Entry& next = entry(ago - 1);
+      filter.predict(entry(ago).inputs.data(), next.time - entry(ago).time);
+      take_in(next);
+    }
+  }
+  void go_back(int ago, WalkingFilter& filter) noexcept {
+    copy_numbers(entry(ago).mean, filter.mean());
+    copy_numbers(entry(ago).covariance, filter.covariance());
   }
   /// How many of the newest samples it takes to have so many positions, used or rejected, and what was known before; 0:
   /// so many are not remembered.

@@ -1,7 +1,9 @@
 // After setup, estimator and controller allocate nothing: every allocation of this program is counted.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
+#include <cstdint>
 #include <limits>
 #include <memory>
 #include <numbers>
@@ -43,6 +45,9 @@ struct Options {
   int heading_starts = 1;
   bool rates = false;    ///< of inputs, which the controller weighs and bounds
   bool watched = false;  ///< measurements are judged, and one of them is off
+  /// By how much an angle is off from some sample on, by samples since then, where measurements are judged.
+  double (*off)(int since) = [](int) { return 0.06; };
+  std::int64_t least_rejected = 0;  ///< measurements of that angle
   int samples = 40;
 };
 
@@ -142,15 +147,17 @@ long allocations_in_the_loop(const Options& options) {
   std::array<double, 2> measured{};
   std::array<double, 3> outputs{};
   int fallbacks = 0;
+  std::int64_t rejected = 0;
   const long before = allocation_count();
   for (int k = 0; k < options.samples; ++k) {
     const double time = 0.2 * k;
     sensors.observe(vehicle.state().data(), outputs.data());
     if (k % 7 == 6) outputs[k % 3] = std::nan("");
-    if (options.watched && k >= 12) outputs[2] += 0.06;             // off by little
+    if (options.watched && k >= 12) outputs[2] += options.off(k - 12);
     if (k != 20) estimator.push_measurement(time, outputs.data());  // a gap
     const Estimate& estimate = estimator.estimate(time);
     fallbacks += estimate.fallback;
+    if (options.watched) rejected = std::max(rejected, estimate.health.sensors.back().rejected);
     const Controller::Command& command = controller.control(estimate);
     if (k % 2) estimator.prepare();
     if (k % 5 == 0) estimator.rehearse();
@@ -162,6 +169,7 @@ long allocations_in_the_loop(const Options& options) {
   }
   const long after = allocation_count();
   EXPECT_EQ(fallbacks, 0);
+  EXPECT_GE(rejected, options.least_rejected);
   const double last = 0.2 * (options.samples - 1);
   EXPECT_GT(controller.follower().arc_length(), 15.0);
   EXPECT_LT(std::hypot(estimator.estimate(last).state[0] - vehicle.state()[0],
@@ -202,6 +210,15 @@ TEST(EstimationAllocation, NoneInTheClosedLoopOfAFilter) { EXPECT_EQ(allocations
 TEST(EstimationAllocation, NoneWhereSensorsAreWatched) {
   EXPECT_EQ(allocations_in_the_loop({.filter = true, .watched = true, .samples = 150}), 0);
   EXPECT_EQ(allocations_in_the_loop({.bank = true, .watched = true, .samples = 150}), 0);
+}
+
+TEST(EstimationAllocation, NoneWhereASensorIsSuspected) {
+  const auto drifts = [](int since) { return std::min(0.2, 0.01 * since); };
+  Options options{.filter = true, .watched = true, .off = drifts, .least_rejected = 20, .samples = 150};
+  EXPECT_EQ(allocations_in_the_loop(options), 0);
+  options.filter = false;
+  options.bank = true;
+  EXPECT_EQ(allocations_in_the_loop(options), 0);
 }
 
 TEST(EstimationAllocation, NoneInTheClosedLoopOfABank) { EXPECT_EQ(allocations_in_the_loop({.bank = true}), 0); }
