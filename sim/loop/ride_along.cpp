@@ -25,7 +25,7 @@ constexpr double rounding = 1e-9;           // relative
 /// How the position was measured wrongly.
 struct Displacement {
   Eigen::Vector2d shift = Eigen::Vector2d::Zero();  ///< [m]
-  bool is_common = false;  ///< all outputs that depend on the position are off by it, and no other output is off
+  bool is_common = false;                           ///< all outputs that depend on the position are off by it
 };
 
 /// The shortest x that makes |A x - b| the least, of two columns A that are not zero.
@@ -56,7 +56,8 @@ class DisplacementOfOutputs {
       const bool is_measured = !std::isnan(added[static_cast<std::size_t>(j)]);
       const Eigen::Vector2d row(jacobian_(j, roles.position_x), jacobian_(j, roles.position_y));
       is_complete = is_complete && (is_measured || row.isZero(0.0));
-      if (!is_measured) continue;
+      // An angle that is off as well displaces nothing.
+      if (!is_measured || row.isZero(0.0)) continue;
       rows.row(j) = row;
       values[j] = added[static_cast<std::size_t>(j)];
     }

@@ -61,6 +61,14 @@ TEST(RideAlong, OnceTheReceiverHasMovedForGoodItsCoordinatesCount) {
   EXPECT_NEAR(all[0].samples.back().followed, 1.0, 0.02);
 }
 
+TEST(RideAlong, AnAngleThatIsOffAsWellDisplacesNothing) {
+  const std::vector<Ride> all = rides(
+      "[{kind: offset, start: 6, sensors: [x_gps, y_gps], size: 20}, {kind: offset, start: 6, sensors: [delta], size: "
+      "1}]");
+  EXPECT_NEAR(all[0].samples[30].displaced, 20.0, 1e-9);
+  EXPECT_NEAR(all[0].samples[30].error, 20.0, 0.5) << "the receiver's coordinates count, and are not followed yet";
+}
+
 TEST(RideAlong, OneCoordinateAloneThatMovesIsASensorThatIsWrong) {
   const std::vector<Ride> all = rides("[{kind: offset, start: 6, length: 2, sensors: [x_gps], size: 20}]");
   EXPECT_LT(all[0].samples[31].error, 1.0) << "the truth has not moved";
