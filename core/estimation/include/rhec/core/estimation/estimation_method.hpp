@@ -25,7 +25,8 @@ class RHEC_EXPORT EstimationMethod {
   /// The first node, with its measured outputs (n_y).
   virtual void start(Measured outputs) noexcept = 0;
   /// The next node, after what was measured since the last, with its measured outputs. With a duration that is not
-  /// positive, the outputs belong to the newest node instead.
+  /// positive, the outputs belong to the newest node instead. Of an interval that ends with a jump, a method may leave
+  /// the jump out: its slip then follows late.
   virtual void add(const MeasuredInterval& interval, Measured outputs) noexcept = 0;
   void add_node(double duration, const double* inputs, Measured outputs) noexcept { add({duration, inputs}, outputs); }
   /// How many measurements an interval can have between its nodes.
