@@ -29,6 +29,8 @@ constexpr double goes_on_by = 0.8;
 constexpr int soon = 1;
 // Slip that has changed within the gates has done so by this many measured positions ago.
 constexpr int changed_before[] = {3, 6};
+// It is at a bound then, but not beyond it by more than so many standard deviations.
+constexpr double unlikely_slip = 1.0;
 // A search that has not explained anything for so long begins anew.
 constexpr int stale = 3;
 
@@ -235,9 +237,14 @@ bool SensorWatch::consider_slip_before() noexcept {
     WalkingFilter& filter = slip_->filter;
     memory_->go_back(back, filter);
     filter.restart_parameters(setup_.parameter_sigmas);
-    memory_->replay(back, filter, [&](const Memory::Entry& entry) { filter.update(entry.outputs.measured()); });
+    double beyond = 0.0;
+    memory_->replay(back, filter, [&](const Memory::Entry& entry) {
+      copy_numbers(filter.mean(), memory_->before_slip);
+      filter.update(entry.outputs.measured());
+      beyond = std::max(beyond, Memory::slip_beyond(filter, memory_->before_slip, setup_.noise));
+    });
     filter.predict(input_.data(), memory_->duration);
-    if (!is_within_bounds(filter.mean()) || !fits(filter, raw_.data())) continue;
+    if (beyond > unlikely_slip || !fits(filter, raw_.data())) continue;
     memory_->jumps[0] = memory_->entry(back).time;
     return true;
   }

@@ -213,7 +213,7 @@ TEST(EstimationAllocation, NoneWhereSensorsAreWatched) {
 }
 
 TEST(EstimationAllocation, NoneWhereASensorIsSuspected) {
-  const auto drifts = [](int since) { return std::min(0.2, 0.01 * since); };
+  const auto drifts = [](int since) { return -std::min(0.2, 0.01 * since); };
   Options options{.filter = true, .watched = true, .off = drifts, .least_rejected = 20, .samples = 150};
   EXPECT_EQ(allocations_in_the_loop(options), 0);
   options.filter = false;
