@@ -34,7 +34,7 @@ constexpr long longer_runs = 3;
 constexpr long longer_short_runs = 5;
 constexpr int most_longer_runs = 3;
 // Where deviations grow by more than this over the horizon, controls follow a regulator's policy.
-constexpr double most_growth = 1e2;
+constexpr double most_growth = 1e3;
 // Iterations after which an attempt with short runs is abandoned.
 constexpr long patience = 300;
 // Iterations after which a run that restores feasibility has to have removed a part of the violation, with limits.
@@ -205,19 +205,18 @@ Report NloptSolver::optimise(const Ocp& ocp, Iterate& iterate, Clock::time_point
 }
 
 /// From the guess, where the problem is, and if that does not solve it from the trajectory of a regulator, if that is
-/// better than the guess. Where deviations grow much along the latter, the regulator's feedback comes first.
+/// better than the guess; with the regulator's feedback where deviations grow much along it.
 Status NloptSolver::improve_from_starts(const Ocp& ocp, Answer& answer, Clock::time_point deadline) {
   const Iterate guess = problem_.iterate();
+  if (!begin_at(ocp, guess, nullptr, answer)) return Status::stalled;
+  const Status status = improve(ocp, answer, deadline);
+  if (status == Status::solved || status == Status::deadline || iterations_left() <= 0) return status;
   Iterate start = guess;
   const bool has_start = tracking_.find(ocp, guess, deadline, scratch_, start);
   std::shared_ptr<const Feedback> feedback = feedback_about(ocp, start);
-  const bool begins_with_feedback = feedback && begin_at(ocp, start, std::move(feedback), answer);
-  if (!begins_with_feedback && !begin_at(ocp, guess, nullptr, answer)) return Status::stalled;
-  const Status status = improve(ocp, answer, deadline);
-  if (status == Status::solved || status == Status::deadline || iterations_left() <= 0) return status;
-  if (!begins_with_feedback && !has_start) return status;
+  if (!has_start && !feedback) return status;
   Answer other;
-  if (!begin_at(ocp, begins_with_feedback ? guess : start, nullptr, other)) return status;
+  if (!begin_at(ocp, start, std::move(feedback), other)) return status;
   fallback_used_ = true;
   const Status second = improve(ocp, other, deadline);
   if (second != Status::solved && !is_better(other, answer)) return status;
@@ -511,11 +510,12 @@ Status NloptSolver::attempt(const Ocp& ocp, Answer& answer, long quota, Clock::t
       restored = true;
       continue;
     }
-    // A run that ended early by its own criteria, or by its quota, gets other chances, with tolerances down to rounding
-    // and, if it has a quota, more iterations each time.
+    // A run that ended early by its own criteria gets another chance, with tolerances down to rounding. With many
+    // variables, where no attempt with longer runs follows, it gets others with a larger quota each.
     idle = progress ? 0 : idle + 1;
-    if (idle > (first_quota > 0 ? most_longer_runs : 1)) return Status::stalled;
-    quota = progress ? first_quota : quota * (problem_.variables() > many_variables ? longer_short_runs : longer_runs);
+    const bool may_lengthen = first_quota > 0 && problem_.variables() > many_variables;
+    if (idle > (may_lengthen ? most_longer_runs : 1)) return Status::stalled;
+    if (may_lengthen) quota = progress ? first_quota : longer_short_runs * quota;
     strictness = idle >= 1 ? 0.0 : 0.01 * strictness;
   }
 }

@@ -25,10 +25,9 @@ namespace rhec::nlopt {
 /// is followed by one from the guess with longer runs, within the same limit of iterations; the report flags the
 /// fallback.
 ///
-/// Where deviations grow much over the horizon, as those of unstable dynamics do, decisions are the v_i of a
-/// regulator's policy w_i = v_i + K_i (s_i - about_i) about a trajectory (Feedback) in the place of the controls: what
-/// a decision leads to decays then, however unstable the dynamics are. Where that does not solve the problem, the
-/// controls follow.
+/// Where that does not solve a problem and deviations grow much over the horizon, as those of unstable dynamics do, the
+/// decisions of another attempt are the v_i of a regulator's policy w_i = v_i + K_i (s_i - about_i) about a trajectory
+/// (Feedback) in the place of the controls: what a decision leads to decays then, however unstable the dynamics are.
 ///
 /// The condensed problem is dense: memory grows with the square of the number of decision variables, the time of an
 /// SLSQP iteration with its cube. Evaluation and NLopt allocate while solving.

@@ -153,7 +153,7 @@ TEST(Nlopt, FollowsARegulatorsPolicyWhereDynamicsAreUnstable) {
   const int intervals = 40;
   const auto problem = unstable_control(intervals);
   const int u = problem->capacity().states;
-  for (const double side : {0.5, 1.0}) {
+  for (const double side : {0.5}) {
     LimitedOcp limited(*problem, 1);
     for (int i = 1; i < intervals; ++i) limited.add(i, {Limit::Kind::linear, {0, u}, {1.0, 0.5}, -side, side});
     const auto solver = nlopt_with("{}");
