@@ -38,8 +38,25 @@ bool CondensedProblem::add(const Entry& entry, double lower, double upper) {
   return true;
 }
 
-bool CondensedProblem::take(const Ocp& ocp) {
+/// With a Feedback, bounds of a control are those of a row.
+bool CondensedProblem::add_control(int interval, int control) {
+  const double lower = ocp_->control_lower(interval)[control], upper = ocp_->control_upper(interval)[control];
+  if (!feedback_ || lower == upper || !(lower <= upper)) return add({false, interval, control}, lower, upper);
+  add({false, interval, control}, -HUGE_VAL, HUGE_VAL);
+  add_row({Row::Of::control, interval, control}, lower, upper);
+  return true;
+}
+
+void CondensedProblem::add_row(const Row& row, double lower, double upper) {
+  if (!std::isfinite(lower) && !std::isfinite(upper)) return;
+  rows_.push_back(row);
+  row_lower_list_.push_back(lower);
+  row_upper_list_.push_back(upper);
+}
+
+bool CondensedProblem::take(const Ocp& ocp, std::shared_ptr<const Feedback> feedback) {
   ocp_ = &ocp;
+  feedback_ = std::move(feedback);
   const int N = ocp.intervals();
   for (auto* list : {&variables_, &fixed_}) list->clear();
   rows_.clear();
@@ -58,16 +75,12 @@ bool CondensedProblem::take(const Ocp& ocp) {
   }
   columns_before_.push_back(variables());
   for (int i = 0; i < N; ++i) {
-    for (int j = 0; j < ocp.control_count(i); ++j)
-      consistent = consistent && add({false, i, j}, ocp.control_lower(i)[j], ocp.control_upper(i)[j]);
+    for (int j = 0; j < ocp.control_count(i); ++j) consistent = consistent && add_control(i, j);
     columns_before_.push_back(variables());
     for (int j = 0; j < ocp.state_count(i + 1); ++j) {
       const double lower = ocp.state_lower(i + 1)[j], upper = ocp.state_upper(i + 1)[j];
       consistent = consistent && lower <= upper;
-      if (!std::isfinite(lower) && !std::isfinite(upper)) continue;
-      rows_.push_back({false, i + 1, j});
-      row_lower_list_.push_back(lower);
-      row_upper_list_.push_back(upper);
+      add_row({Row::Of::state, i + 1, j}, lower, upper);
     }
   }
   if (capacity.limits > 0) add_limits();
@@ -95,7 +108,7 @@ void CondensedProblem::add_limits() {
         penalties_.push_back({i, r});
         continue;
       }
-      Row row{true, i, r};
+      Row row{Row::Of::limit, i, r};
       const auto add_slack = [&](bool is_above) {
         slacks_.push_back({i, r, is_above});
         lower_list_.push_back(0.0);
@@ -104,9 +117,7 @@ void CondensedProblem::add_limits() {
       };
       if (std::isfinite(linear) && std::isfinite(lower)) row.below = add_slack(false);
       if (std::isfinite(linear) && std::isfinite(upper)) row.above = add_slack(true);
-      rows_.push_back(row);
-      row_lower_list_.push_back(lower);
-      row_upper_list_.push_back(upper);
+      add_row(row, lower, upper);
     }
   }
 }
@@ -124,7 +135,8 @@ double CondensedProblem::slack_weight(const Slack& of, double value) const noexc
 
 double CondensedProblem::row_value(int number) const noexcept {
   const Row& row = rows_[static_cast<std::size_t>(number)];
-  if (!row.is_limit) return point_.state(row.stage)[row.component];
+  if (row.of == Row::Of::state) return point_.state(row.stage)[row.component];
+  if (row.of == Row::Of::control) return point_.control(row.stage)[row.component];
   double value = limit_value(row.stage, row.component);
   if (row.below >= 0) value += x_[row.below];
   if (row.above >= 0) value -= x_[row.above];
@@ -160,10 +172,19 @@ CondensedProblem::Vector CondensedProblem::read(const Iterate& iterate) const {
   Vector x = Vector::Zero(variables());
   for (int k = 0; k < static_cast<int>(variables_.size()); ++k) {
     const Entry& e = variables_[static_cast<std::size_t>(k)];
-    const double value = e.is_state ? iterate.state(0)[e.component] : iterate.control(e.stage)[e.component];
+    double value = e.is_state ? iterate.state(0)[e.component] : iterate.control(e.stage)[e.component];
+    if (feedback_ && !e.is_state) value -= feedback_->of(e.stage, e.component, iterate);
     x[k] = std::min(std::max(value, lower_[k]), upper_[k]);
   }
   return x;
+}
+
+void CondensedProblem::simulate() {
+  if (!feedback_) return ocp_->simulate(point_, scratch_);
+  for (int i = 0; i < ocp_->intervals(); ++i) {
+    for (int j = 0; j < ocp_->control_count(i); ++j) point_.control(i)[j] += feedback_->of(i, j, point_);
+    ocp_->simulate_interval(i, point_, scratch_);
+  }
 }
 
 bool CondensedProblem::move_to(const Vector& x) {
@@ -178,7 +199,7 @@ bool CondensedProblem::move_to(const Vector& x) {
   };
   for (std::size_t k = 0; k < fixed_.size(); ++k) put(fixed_[k], fixed_values_[k]);
   for (std::size_t k = 0; k < variables_.size(); ++k) put(variables_[k], x_[static_cast<Eigen::Index>(k)]);
-  ocp_->simulate(point_, scratch_);
+  simulate();
   objective_ = stage_objective_ = ocp_->evaluate(point_, nullptr, scratch_);
   is_finite_ = std::isfinite(objective_) && rhec::is_finite(*ocp_, point_);
   if (!limit_values_.empty() && is_finite_) {
@@ -193,7 +214,7 @@ bool CondensedProblem::move_to(const Vector& x) {
       objective_ += 0.5 * ocp_->limit_quadratic(penalty.stage)[penalty.component] * beyond * beyond;
     }
     for (const Row& row : rows_)
-      if (row.is_limit) is_finite_ = is_finite_ && std::isfinite(limit_value(row.stage, row.component));
+      if (row.of == Row::Of::limit) is_finite_ = is_finite_ && std::isfinite(limit_value(row.stage, row.component));
     is_finite_ = is_finite_ && std::isfinite(objective_);
   }
   return is_finite_;
@@ -214,17 +235,35 @@ void CondensedProblem::linearise() {
   ++linearisations_;
 }
 
-double CondensedProblem::reduced_gradient(const Entry& e) const noexcept {
-  // `adjoint_` has the costates of nodes 1 .. N; the costate of a free node 0 is this gradient.
+void CondensedProblem::find_costates(Iterate& multipliers) const noexcept {
+  if (!feedback_) return set_costates(qp_, multipliers);
+  for (int i = ocp_->intervals(); i >= 0; --i) {
+    if (i == 0 && !qp_.initial_state_is_given) {
+      std::fill_n(multipliers.costate(0), qp_.states(0), 0.0);
+      break;
+    }
+    for (int j = 0; j < qp_.states(i); ++j) multipliers.costate(i)[j] = reduced_gradient({true, i, j}, multipliers);
+  }
+}
+
+/// The gradient of the Lagrangian with respect to one state or control, with the costates of the next node; with a
+/// Feedback, that of a state includes what the controls do that follow it.
+double CondensedProblem::reduced_gradient(const Entry& e, const Iterate& multipliers) const noexcept {
   const int i = e.stage, N = ocp_->intervals();
-  double sum = e.is_state ? qp_.q(0)[e.component] : qp_.r(i)[e.component];
+  double sum = e.is_state ? qp_.q(i)[e.component] : qp_.r(i)[e.component];
+  sum += (e.is_state ? multipliers.state_bound(i) : multipliers.control_bound(i))[e.component];
   if (i < N) {
     const double* column = qp_.AB(i) + e.component + (e.is_state ? 0 : qp_.capacity().states);
-    for (int j = 0; j < qp_.states(i + 1); ++j) sum += column[j * qp_.stride()] * adjoint_.costate(i + 1)[j];
+    for (int j = 0; j < qp_.states(i + 1); ++j) sum += column[j * qp_.stride()] * multipliers.costate(i + 1)[j];
   }
-  if (qp_.limits(i) == 0) return sum;
-  const double* column = qp_.G(i) + e.component + (e.is_state ? 0 : qp_.capacity().states);
-  for (int r = 0; r < qp_.limits(i); ++r) sum += column[r * qp_.stride()] * adjoint_.limit_bound(i)[r];
+  if (qp_.limits(i) > 0) {
+    const double* column = qp_.G(i) + e.component + (e.is_state ? 0 : qp_.capacity().states);
+    for (int r = 0; r < qp_.limits(i); ++r) sum += column[r * qp_.stride()] * multipliers.limit_bound(i)[r];
+  }
+  if (!feedback_ || !e.is_state || i == N) return sum;
+  for (int j = 0; j < qp_.controls(i); ++j)
+    if (const double gain = feedback_->gains[static_cast<std::size_t>(i)](j, e.component); gain != 0.0)
+      sum += gain * reduced_gradient({false, i, j}, multipliers);
   return sum;
 }
 
@@ -240,10 +279,10 @@ const CondensedProblem::Vector& CondensedProblem::gradient() {
   if (has_gradient_) return gradient_;
   adjoint_.clear_multipliers();
   write_penalties(adjoint_);
-  set_costates(qp_, adjoint_);
+  find_costates(adjoint_);
   gradient_.resize(variables());
   for (std::size_t k = 0; k < variables_.size(); ++k)
-    gradient_[static_cast<Eigen::Index>(k)] = reduced_gradient(variables_[k]);
+    gradient_[static_cast<Eigen::Index>(k)] = reduced_gradient(variables_[k], adjoint_);
   auto column = static_cast<Eigen::Index>(variables_.size());
   for (const Slack& slack : slacks_) {
     gradient_[column] = slack_weight(slack, x_[column]);
@@ -258,6 +297,7 @@ void CondensedProblem::compute_sensitivities() {
   if (has_sensitivities_) return;
   const int N = ocp_->intervals();
   sensitivities_.resize(static_cast<std::size_t>(N) + 1);
+  if (feedback_) control_sensitivities_.resize(static_cast<std::size_t>(N));
   const auto columns = [&](int node) { return columns_before_[static_cast<std::size_t>(node)]; };
   Matrix& first = sensitivities_[0];
   first.setZero(qp_.states(0), columns(0));
@@ -266,6 +306,16 @@ void CondensedProblem::compute_sensitivities() {
     Matrix& next = sensitivities_[static_cast<std::size_t>(i) + 1];
     next.setZero(qp_.states(i + 1), columns(i + 1));
     next.leftCols(columns(i)).noalias() = A_of(qp_, i) * sensitivities_[static_cast<std::size_t>(i)];
+    if (feedback_) {
+      Matrix& of_controls = control_sensitivities_[static_cast<std::size_t>(i)];
+      of_controls.setZero(qp_.controls(i), columns(i + 1));
+      of_controls.leftCols(columns(i)).noalias() =
+          feedback_->gains[static_cast<std::size_t>(i)] * sensitivities_[static_cast<std::size_t>(i)];
+      for (int j = 0; j < qp_.controls(i); ++j)
+        if (const int column = column_of(i, j); column >= 0) of_controls(j, column) = 1.0;
+      next.noalias() += B_of(qp_, i) * of_controls;
+      continue;
+    }
     for (int j = 0; j < qp_.controls(i); ++j) {
       const int column = column_of(i, j);
       if (column >= 0) next.col(column) = B_of(qp_, i).col(j);
@@ -274,15 +324,16 @@ void CondensedProblem::compute_sensitivities() {
   jacobian_.setZero(rows(), variables());
   for (int row = 0; row < rows(); ++row) {
     const Row& of = rows_[static_cast<std::size_t>(row)];
-    const Matrix& node = sensitivities_[static_cast<std::size_t>(of.stage)];
-    if (of.is_limit) {
+    if (of.of == Row::Of::limit) {
       Eigen::RowVectorXd derivatives = Eigen::RowVectorXd::Zero(variables());
       add_limit_row(of.stage, of.component, derivatives);
       if (of.below >= 0) derivatives[of.below] = 1.0;
       if (of.above >= 0) derivatives[of.above] = -1.0;
       jacobian_.row(row) = derivatives;
     } else {
-      jacobian_.row(row).head(node.cols()) = node.row(of.component);
+      const Matrix& entries =
+          (of.of == Row::Of::state ? sensitivities_ : control_sensitivities_)[static_cast<std::size_t>(of.stage)];
+      jacobian_.row(row).head(entries.cols()) = entries.row(of.component);
     }
   }
   has_sensitivities_ = true;
@@ -292,6 +343,12 @@ void CondensedProblem::add_limit_row(int stage, int limit, Eigen::Ref<Eigen::Row
   const Matrix& node = sensitivities_[static_cast<std::size_t>(stage)];
   const double* G = qp_.G(stage) + static_cast<std::ptrdiff_t>(limit) * qp_.stride();
   row.head(node.cols()) += Eigen::Map<const Eigen::RowVectorXd>(G, node.rows()) * node;
+  if (feedback_ && stage < ocp_->intervals()) {
+    const Matrix& of_controls = control_sensitivities_[static_cast<std::size_t>(stage)];
+    row.head(of_controls.cols()) +=
+        Eigen::Map<const Eigen::RowVectorXd>(G + qp_.capacity().states, of_controls.rows()) * of_controls;
+    return;
+  }
   for (int j = 0; j < qp_.controls(stage); ++j)
     if (const int column = column_of(stage, j); column >= 0) row[column] += G[qp_.capacity().states + j];
 }
@@ -314,6 +371,17 @@ const CondensedProblem::Matrix& CondensedProblem::hessian(Hessian kind) {
     product.noalias() = Q_of(qp_, i) * G;
     hessian_.topLeftCorner(columns, columns).noalias() += G.transpose() * product;
     if (i == N) break;
+    if (feedback_) {
+      const Matrix& W = control_sensitivities_[static_cast<std::size_t>(i)];
+      const Eigen::Index width = W.cols();
+      product.noalias() = R_of(qp_, i) * W;
+      hessian_.topLeftCorner(width, width).noalias() += W.transpose() * product;
+      product.noalias() = S_of(qp_, i) * G;
+      product = Matrix(W.transpose() * product);
+      hessian_.topLeftCorner(width, columns) += product;
+      hessian_.topLeftCorner(columns, width) += product.transpose();
+      continue;
+    }
     product.noalias() = S_of(qp_, i) * G;
     for (int j = 0; j < qp_.controls(i); ++j) {
       const int row = column_of(i, j);
@@ -348,20 +416,22 @@ void CondensedProblem::set_multipliers(const Vector& multipliers) {
   const auto put = [&](const Entry& e, double value) {
     (e.is_state ? point_.state_bound(e.stage) : point_.control_bound(e.stage))[e.component] = value;
   };
-  // With the rows' multipliers set, those of fixed variables follow from stationarity.
+  // With the rows' multipliers set, those of fixed variables follow from stationarity. A Feedback leaves these alone.
   adjoint_.clear_multipliers();
   for (Iterate* of : {&point_, &adjoint_}) {
     write_penalties(*of);
     for (int k = 0; k < rows(); ++k) {
       const Row& row = rows_[static_cast<std::size_t>(k)];
-      (row.is_limit ? of->limit_bound(row.stage) : of->state_bound(row.stage))[row.component] =
-          multipliers[variables() + k];
+      (row.of == Row::Of::limit   ? of->limit_bound(row.stage)
+       : row.of == Row::Of::state ? of->state_bound(row.stage)
+                                  : of->control_bound(row.stage))[row.component] = multipliers[variables() + k];
     }
   }
-  set_costates(qp_, adjoint_);
-  for (const Entry& e : fixed_) put(e, -reduced_gradient(e));
-  for (std::size_t k = 0; k < variables_.size(); ++k) put(variables_[k], multipliers[static_cast<Eigen::Index>(k)]);
-  set_costates(qp_, point_);
+  find_costates(adjoint_);
+  for (const Entry& e : fixed_) put(e, -reduced_gradient(e, adjoint_));
+  for (std::size_t k = 0; k < variables_.size(); ++k)
+    if (feedback_ == nullptr || variables_[k].is_state) put(variables_[k], multipliers[static_cast<Eigen::Index>(k)]);
+  find_costates(point_);
 }
 
 KktResidual CondensedProblem::residual() {

@@ -1,9 +1,11 @@
 #pragma once
 
+#include <memory>
 #include <vector>
 
 #include <Eigen/Core>
 
+#include "feedback.hpp"
 #include "rhec/core/ocp/ocp.hpp"
 #include "rhec/core/qp/kkt.hpp"
 
@@ -17,6 +19,9 @@ namespace rhec::nlopt {
 /// and the limits, g + sigma_lower - sigma_upper, with a slack for each side of a soft limit. Without a linear weight a
 /// soft limit is no row: f has what its violation costs, whose gradient is continuous. All evaluations at one x share
 /// one simulation and one linearisation.
+///
+/// With a Feedback, x has v_i = w_i - K_i (s_i - about_i) in the place of w_i, so that deviations do not grow with the
+/// simulation however unstable the dynamics are; the bounds of controls are rows of c then.
 class CondensedProblem {
  public:
   using Vector = Eigen::VectorXd;
@@ -27,7 +32,8 @@ class CondensedProblem {
 
   /// Takes on the Ocp's current structure and bounds; false if a lower bound is above its upper bound. The Ocp must
   /// outlive the use of this object until the next call.
-  bool take(const Ocp& ocp);
+  bool take(const Ocp& ocp, std::shared_ptr<const Feedback> feedback = nullptr);
+  const std::shared_ptr<const Feedback>& feedback() const noexcept { return feedback_; }
 
   int variables() const noexcept { return static_cast<int>(variables_.size() + slacks_.size()); }
   int rows() const noexcept { return static_cast<int>(rows_.size()); }
@@ -36,7 +42,8 @@ class CondensedProblem {
   const Vector& row_lower() const noexcept { return row_lower_; }
   const Vector& row_upper() const noexcept { return row_upper_; }
 
-  /// x of an iterate, clipped to the bounds, without slacks.
+  /// x of an iterate, clipped to the bounds, without slacks. With a Feedback the iterate's states are those of its
+  /// simulation.
   Vector read(const Iterate& iterate) const;
   /// The current x with the slacks that its limits need.
   Vector with_fitting_slacks() const;
@@ -78,9 +85,9 @@ class CondensedProblem {
     bool is_state = false;
     int stage = 0, component = 0;
   };
-  /// A bounded state, or a limit with the columns of its slacks, -1 where there is none.
+  /// A bounded state or control, or a limit with the columns of its slacks, -1 where there is none.
   struct Row {
-    bool is_limit = false;
+    enum class Of { state, control, limit } of = Of::state;
     int stage = 0, component = 0, below = -1, above = -1;
   };
   struct Slack {
@@ -102,16 +109,21 @@ class CondensedProblem {
   void add_limit_row(int stage, int limit, Eigen::Ref<Eigen::RowVectorXd> row);
   void write_penalties(Iterate& multipliers) const noexcept;
   bool add(const Entry& entry, double lower, double upper);
+  bool add_control(int interval, int control);
+  void add_row(const Row& row, double lower, double upper);
+  void simulate();
+  /// The costates that go with the multipliers of an iterate: those of the dynamics, or of them with the Feedback.
+  void find_costates(Iterate& multipliers) const noexcept;
+  double reduced_gradient(const Entry& entry, const Iterate& multipliers) const noexcept;
   int& column_of(int interval, int control) noexcept {
     const auto width = static_cast<std::size_t>(ocp_->capacity().controls);
     return control_columns_[static_cast<std::size_t>(interval) * width + static_cast<std::size_t>(control)];
   }
   void linearise();
   void compute_sensitivities();
-  /// The reduced gradient with respect to one entry of s_0 or w, with the current costates.
-  double reduced_gradient(const Entry& entry) const noexcept;
 
   const Ocp* ocp_ = nullptr;
+  std::shared_ptr<const Feedback> feedback_;
   std::vector<Entry> variables_, fixed_;
   std::vector<Row> rows_;
   std::vector<Slack> slacks_;  ///< the last columns of x
@@ -122,7 +134,8 @@ class CondensedProblem {
   std::vector<int> columns_before_;   ///< number of variables that node i depends on
   Vector lower_, upper_, row_lower_, row_upper_, x_, gradient_;
   Matrix jacobian_, hessian_;
-  std::vector<Matrix> sensitivities_;  ///< ds_i/dx, its columns_before_[i] columns
+  std::vector<Matrix> sensitivities_;          ///< ds_i/dx, its columns_before_[i] columns
+  std::vector<Matrix> control_sensitivities_;  ///< with a Feedback, dw_i/dx, its columns_before_[i + 1] columns
   bool is_simulated_ = false, is_finite_ = false, is_linearised_ = false, has_gradient_ = false,
        has_sensitivities_ = false;
   double objective_ = 0.0, stage_objective_ = 0.0;

@@ -30,6 +30,11 @@ constexpr long iterations_of_few_variables = 15;
 // Factor by which the runs of a second attempt are longer. With very uneven weights, rounding decides how far a short
 // run gets.
 constexpr long longer_runs = 3;
+// The same of a run that follows one without progress, with many variables, and how many such may follow each other.
+constexpr long longer_short_runs = 5;
+constexpr int most_longer_runs = 3;
+// Where deviations grow by more than this over the horizon, controls follow a regulator's policy.
+constexpr double most_growth = 1e3;
 // Iterations after which an attempt with short runs is abandoned.
 constexpr long patience = 300;
 // Iterations after which a run that restores feasibility has to have removed a part of the violation, with limits.
@@ -138,6 +143,7 @@ void NloptSolver::setup(const Ocp& ocp) {
   problem_ = CondensedProblem(ocp);
   if (ocp.capacity().limits > 0) search_.setup(ocp);
   tracking_.setup(ocp);
+  regulator_.setup(ocp);
   qp_ = StageQp(ocp.capacity());
   scratch_.assign(ocp.scratch_size(), 0.0);
 }
@@ -178,11 +184,8 @@ Report NloptSolver::optimise(const Ocp& ocp, Iterate& iterate, Clock::time_point
   // The structure may have changed since setup.
   if (!why_not(ocp).empty() || !find_start(ocp, iterate)) return leave_as_it_was(Status::stalled);
 
-  if (problem_.has_slacks()) problem_.move_to(problem_.with_fitting_slacks());
-  Answer answer = assess(problem_.x());
-  Status status = improve(ocp, answer, deadline);
-  if (status != Status::solved && status != Status::deadline)
-    status = improve_from_tracking(ocp, iterate, status, answer, deadline);
+  Answer answer;
+  Status status = improve_from_starts(ocp, answer, deadline);
   search_.begin();
   const auto may_be_misled = [&] {
     return status == Status::infeasible || (status == Status::stalled && answer.violation > infeasible_beyond);
@@ -193,8 +196,7 @@ Report NloptSolver::optimise(const Ocp& ocp, Iterate& iterate, Clock::time_point
   }
   report.iterations = static_cast<int>(iterations_);
   if (status == Status::infeasible) return leave_as_it_was(status);
-  problem_.move_to(answer.x);
-  problem_.set_multipliers(answer.multipliers);
+  go_back_to(answer);
   report.status = status;
   report.objective = problem_.objective_of_iterate();
   report.kkt = problem_.residual();
@@ -202,32 +204,57 @@ Report NloptSolver::optimise(const Ocp& ocp, Iterate& iterate, Clock::time_point
   return report;
 }
 
-/// Simulations of an unstable vehicle may have led far away: another attempt, from a trajectory that a regulator keeps
-/// together, if that is better than the guess.
-Status NloptSolver::improve_from_tracking(const Ocp& ocp, const Iterate& guess, Status status, Answer& answer,
-                                          Clock::time_point deadline) {
+/// From the guess, where the problem is, and if that does not solve it from the trajectory of a regulator, if that is
+/// better than the guess; with the regulator's feedback where deviations grow much along it.
+Status NloptSolver::improve_from_starts(const Ocp& ocp, Answer& answer, Clock::time_point deadline) {
+  const Iterate guess = problem_.iterate();
+  if (!begin_at(ocp, guess, nullptr, answer)) return Status::stalled;
+  const Status status = improve(ocp, answer, deadline);
+  if (status == Status::solved || status == Status::deadline || iterations_left() <= 0) return status;
   Iterate start = guess;
-  if (iterations_left() <= 0 || !tracking_.find(ocp, guess, deadline, scratch_, start)) return status;
-  if (!problem_.move_to(problem_.read(start))) return status;
-  if (problem_.has_slacks()) problem_.move_to(problem_.with_fitting_slacks());
+  const bool has_start = tracking_.find(ocp, guess, deadline, scratch_, start);
+  std::shared_ptr<const Feedback> feedback = feedback_about(ocp, start);
+  if (!has_start && !feedback) return status;
+  Answer other;
+  if (!begin_at(ocp, start, std::move(feedback), other)) return status;
   fallback_used_ = true;
-  Answer other = assess(problem_.x());
   const Status second = improve(ocp, other, deadline);
   if (second != Status::solved && !is_better(other, answer)) return status;
   answer = std::move(other);
   return second;
 }
 
-/// The answer becomes one at another start, if there is one.
-bool NloptSolver::find_other_start(const Ocp& ocp, const Iterate& guess, Answer& answer, Clock::time_point deadline) {
-  if (!problem_.has_limits()) return false;
-  problem_.move_to(answer.x);
-  Iterate other = problem_.iterate();
-  if (!search_.find_other(ocp, guess, other, deadline, scratch_, other)) return false;
-  if (!problem_.move_to(problem_.read(other))) return false;
+/// Null where deviations do not grow much along a trajectory, and where bounds of controls cannot be constraints.
+std::shared_ptr<const Feedback> NloptSolver::feedback_about(const Ocp& ocp, const Iterate& start) {
+  if (!ocp.can_roll_out() || !scales_fully() || !traits_.from_start ||
+      !(regulator_.growth(ocp, start, scratch_) > most_growth))
+    return nullptr;
+  return regulator_.about(ocp, start, scratch_);
+}
+
+/// The answer becomes the one at a trajectory. False if its simulation is not finite.
+bool NloptSolver::begin_at(const Ocp& ocp, const Iterate& start, std::shared_ptr<const Feedback> feedback,
+                           Answer& answer) {
+  problem_.take(ocp, std::move(feedback));
+  if (!problem_.move_to(problem_.read(start))) return false;
   if (problem_.has_slacks()) problem_.move_to(problem_.with_fitting_slacks());
   answer = assess(problem_.x());
   return true;
+}
+
+void NloptSolver::go_back_to(const Answer& answer) {
+  if (answer.feedback != problem_.feedback()) problem_.take(*ocp_, answer.feedback);
+  problem_.move_to(answer.x);
+  problem_.set_multipliers(answer.multipliers);
+}
+
+/// The answer becomes one at another start, if there is one.
+bool NloptSolver::find_other_start(const Ocp& ocp, const Iterate& guess, Answer& answer, Clock::time_point deadline) {
+  if (!problem_.has_limits()) return false;
+  go_back_to(answer);
+  Iterate other = problem_.iterate();
+  if (!search_.find_other(ocp, guess, other, deadline, scratch_, other)) return false;
+  return begin_at(ocp, other, feedback_about(ocp, other), answer);
 }
 
 /// Simulates the guess. If the result is not finite, controls closer to zero are tried.
@@ -261,7 +288,8 @@ CondensedQp qp_at(CondensedProblem& problem) {
 
 NloptSolver::Answer NloptSolver::answer_with(const Vector& multipliers) {
   problem_.set_multipliers(multipliers);
-  Answer answer{problem_.x(), multipliers, problem_.objective(), problem_.violation(), problem_.residual()};
+  Answer answer{problem_.feedback(),  problem_.x(),         multipliers,
+                problem_.objective(), problem_.violation(), problem_.residual()};
   answer.merit = answer.objective;
   const auto add = [&](double multiplier, double value, double lower, double upper) {
     answer.merit += std::abs(multiplier) * std::max({0.0, lower - value, value - upper});
@@ -432,6 +460,7 @@ Status NloptSolver::attempt(const Ocp& ocp, Answer& answer, long quota, Clock::t
     if (answer.kkt.largest() <= options_.tolerance) return Status::solved;
     return answer.violation > options_.tolerance ? Status::infeasible : Status::stalled;
   }
+  const long first_quota = quota;
   bool restored = false;
   double least_residual = answer.kkt.largest();
   int idle = 0;
@@ -481,10 +510,13 @@ Status NloptSolver::attempt(const Ocp& ocp, Answer& answer, long quota, Clock::t
       restored = true;
       continue;
     }
-    // A run that ended early by its own criteria gets another chance, with tolerances down to rounding.
+    // A run that ended early by its own criteria gets another chance, with tolerances down to rounding. With many
+    // variables, where no attempt with longer runs follows, it gets others with a larger quota each.
     idle = progress ? 0 : idle + 1;
-    if (idle > 1) return Status::stalled;
-    strictness = idle == 1 ? 0.0 : 0.01 * strictness;
+    const bool may_lengthen = first_quota > 0 && problem_.variables() > many_variables;
+    if (idle > (may_lengthen ? most_longer_runs : 1)) return Status::stalled;
+    if (may_lengthen) quota = progress ? first_quota : longer_short_runs * quota;
+    strictness = idle >= 1 ? 0.0 : 0.01 * strictness;
   }
 }
 

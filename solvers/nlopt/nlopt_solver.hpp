@@ -3,6 +3,7 @@
 #include <string>
 
 #include "condensed.hpp"
+#include "feedback.hpp"
 #include "nlopt_options.hpp"
 #include "nlopt_run.hpp"
 #include "rhec/core/ocp/solver.hpp"
@@ -24,6 +25,10 @@ namespace rhec::nlopt {
 /// is followed by one from the guess with longer runs, within the same limit of iterations; the report flags the
 /// fallback.
 ///
+/// Where that does not solve a problem and deviations grow much over the horizon, as those of unstable dynamics do, the
+/// decisions of another attempt are the v_i of a regulator's policy w_i = v_i + K_i (s_i - about_i) about a trajectory
+/// (Feedback) in the place of the controls: what a decision leads to decays then, however unstable the dynamics are.
+///
 /// The condensed problem is dense: memory grows with the square of the number of decision variables, the time of an
 /// SLSQP iteration with its cube. Evaluation and NLopt allocate while solving.
 class NloptSolver final : public Solver {
@@ -42,6 +47,7 @@ class NloptSolver final : public Solver {
  private:
   /// An iterate and its measures of quality.
   struct Answer {
+    std::shared_ptr<const Feedback> feedback;  ///< of which x is made
     Eigen::VectorXd x, multipliers;
     double objective = 0.0, violation = 0.0;
     KktResidual kkt;
@@ -52,8 +58,10 @@ class NloptSolver final : public Solver {
   Status attempt(const Ocp& ocp, Answer& answer, long quota, Clock::time_point deadline);
   Status restore_feasibility(const Ocp& ocp, Answer& answer, Clock::time_point deadline);
   bool find_start(const Ocp& ocp, const Iterate& iterate);
-  Status improve_from_tracking(const Ocp& ocp, const Iterate& guess, Status status, Answer& answer,
-                               Clock::time_point deadline);
+  Status improve_from_starts(const Ocp& ocp, Answer& answer, Clock::time_point deadline);
+  std::shared_ptr<const Feedback> feedback_about(const Ocp& ocp, const Iterate& start);
+  bool begin_at(const Ocp& ocp, const Iterate& start, std::shared_ptr<const Feedback> feedback, Answer& answer);
+  void go_back_to(const Answer& answer);
   bool find_other_start(const Ocp& ocp, const Iterate& guess, Answer& answer, Clock::time_point deadline);
   Eigen::VectorXd within_bounds(const Eigen::VectorXd& x) const;
   Answer assess(const Eigen::VectorXd& x);
@@ -74,6 +82,7 @@ class NloptSolver final : public Solver {
   StageQp qp_;
   StartSearch search_;
   TrackingStart tracking_;
+  Regulator regulator_;
   int factorisations_ = 0;
   long iterations_ = 0;
   long limit_ = 0;  ///< of the iterations, for the current attempt

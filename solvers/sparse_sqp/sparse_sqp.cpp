@@ -33,6 +33,8 @@ constexpr double largest_penalty = 1e10;
 // remove less than the small one count ten times.
 constexpr double short_step = 1e-2, small_share = 1e-2, most_left = 0.9;
 constexpr int most_futile = 50;
+// Share of the iterations after which another start is looked for.
+constexpr double patience = 0.5;
 // Share of a solution's objective that the remaining defects may account for.
 constexpr double negligible_share = 1e-9;
 constexpr int corrections = 4;
@@ -92,6 +94,10 @@ void SparseSqp::setup(const Ocp& ocp) {
   scratch_.assign(ocp.scratch_size(), 0.0);
   defects_.assign(static_cast<std::size_t>(capacity.intervals) * capacity.states, 0.0);
   if (capacity.limits > 0) search_.setup(ocp);
+  if (ocp.can_roll_out()) {
+    tracking_.setup(ocp);
+    tracking_start_ = Iterate(capacity);
+  }
   limit_values_.assign((static_cast<std::size_t>(capacity.intervals) + 1) * capacity.limit_row(), 0.0);
   reset();
 }
@@ -374,7 +380,30 @@ bool SparseSqp::is_futile(SparseQp::Outcome outcome, const Report& report) noexc
   return futile_ >= most_futile && violation_of(report.kkt) > options_.tolerance;
 }
 
-Status SparseSqp::converge(const Ocp& ocp, Report& report, Clock::time_point deadline) {
+/// Looks for a regulator's trajectory, once in a solve: where the simulation of a guess leads far away, so do steps.
+bool SparseSqp::find_tracking_start(const Ocp& ocp, const Iterate& guess, Clock::time_point deadline) noexcept {
+  if (std::exchange(has_looked_for_tracking_, true)) return false;
+  has_tracking_start_ = tracking_.find(ocp, guess, deadline, scratch_, tracking_start_);
+  return has_tracking_start_;
+}
+
+void SparseSqp::begin_within_bounds(const Ocp& ocp) noexcept {
+  nlp_.read(ocp, current_, z_.data(), multipliers_.data(), bound_multipliers_.data());
+  for (std::size_t k = 0; k < z_.size(); ++k) z_[k] = std::clamp(z_[k], lower_z_[k], upper_z_[k]);
+  nlp_.write(ocp, z_.data(), nullptr, nullptr, current_);
+}
+
+/// The next attempt is from `current_`.
+void SparseSqp::begin_again(const Ocp& ocp, Report& report) noexcept {
+  nlp_.read(ocp, current_, z_.data(), multipliers_.data(), bound_multipliers_.data());
+  qp_.factor().forget_scales();
+  penalty_ = 0.0;
+  penalty_cuts_left_ = most_penalty_cuts;
+  report.fallback_used = true;
+  ++report.iterations;
+}
+
+Status SparseSqp::converge(const Ocp& ocp, const Iterate& guess, Report& report, Clock::time_point deadline) {
   bool use_exact = options_.hessian == Curvature::exact ||
                    (options_.hessian == Curvature::automatic && ocp.preferred_hessian() == Hessian::exact);
   double last_residual = infinity;
@@ -403,6 +432,9 @@ Status SparseSqp::converge(const Ocp& ocp, Report& report, Clock::time_point dea
       return Status::solved;
     }
     if (report.iterations == options_.max_iterations) return Status::iteration_limit;
+    if (report.iterations == std::max(1, static_cast<int>(patience * options_.max_iterations)) &&
+        find_tracking_start(ocp, guess, deadline))
+      return Status::iteration_limit;
     if (Clock::now() > deadline) return Status::deadline;
     // If Gauss-Newton makes little progress the residuals are large: there the exact Hessian does better.
     if (options_.hessian == Curvature::automatic && !use_exact && ocp.has_second_derivatives()) {
@@ -457,23 +489,24 @@ Report SparseSqp::solve(Iterate& iterate, Clock::time_point deadline) noexcept {
       assess(ocp, iterate, stages_, scratch_, report);
       return report;
     }
-    nlp_.read(ocp, iterate, z_.data(), multipliers_.data(), bound_multipliers_.data());
-    for (std::size_t k = 0; k < z_.size(); ++k) z_[k] = std::clamp(z_[k], lower_z_[k], upper_z_[k]);
-    nlp_.write(ocp, z_.data(), nullptr, nullptr, current_);
+    begin_within_bounds(ocp);
     search_.begin();
+    has_looked_for_tracking_ = has_tracking_start_ = false;
     while (true) {
-      if (search_.starts() > 0) {
-        nlp_.read(ocp, current_, z_.data(), multipliers_.data(), bound_multipliers_.data());
-        qp_.factor().forget_scales();
-        penalty_ = 0.0;
-        penalty_cuts_left_ = most_penalty_cuts;
-        report.fallback_used = true;
-        ++report.iterations;
+      report.status = converge(ocp, iterate, report, deadline);
+      if (report.status == Status::solved || report.status == Status::deadline ||
+          report.iterations >= options_.max_iterations)
+        break;
+      if (has_tracking_start_ || find_tracking_start(ocp, iterate, deadline)) {
+        has_tracking_start_ = false;
+        current_ = tracking_start_;
+        begin_within_bounds(ocp);
+      } else {
+        const bool may_be_misled = report.status == Status::infeasible ||
+                                   (report.status == Status::stalled && violation_of(report.kkt) > options_.tolerance);
+        if (!may_be_misled || !search_.find_other(ocp, iterate, current_, deadline, scratch_, current_)) break;
       }
-      report.status = converge(ocp, report, deadline);
-      const bool may_be_misled = report.status == Status::infeasible ||
-                                 (report.status == Status::stalled && violation_of(report.kkt) > options_.tolerance);
-      if (!may_be_misled || !search_.find_other(ocp, iterate, current_, deadline, scratch_, current_)) break;
+      begin_again(ocp, report);
     }
   } catch (const std::bad_alloc&) {
     reset();  // the data of the structure may be incomplete

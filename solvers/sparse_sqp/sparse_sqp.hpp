@@ -6,6 +6,7 @@
 
 #include "rhec/core/config/options.hpp"
 #include "rhec/core/ocp/start_search.hpp"
+#include "rhec/core/ocp/tracking_start.hpp"
 #include "row_costs.hpp"
 #include "sparse_qp.hpp"
 
@@ -33,7 +34,8 @@ struct SparseSqpOptions {
 /// are shorter around stages where the merit would rise, and second-order corrections account for the curvature of the
 /// equations. Where the exact Hessian is not convex enough, stages take the Gauss-Newton Hessian (convexify_by_stages).
 /// If linearised equations contradict the bounds, they are relaxed (Sl1QP [15]); an iterate at which no step reduces
-/// |c|_1 is reported as infeasible.
+/// |c|_1 is reported as infeasible. Where all that does not solve a problem, or takes long, it begins again at the
+/// trajectory of a regulator (TrackingStart) if there is one that is better than the guess.
 class SparseSqp final : public Solver {
  public:
   using Options = SparseSqpOptions;
@@ -56,7 +58,10 @@ class SparseSqp final : public Solver {
   bool shorten_locally();
   bool search(const Ocp& ocp, double residual, double& after);
   void polish(const Ocp& ocp, Report& report, Clock::time_point deadline);
-  Status converge(const Ocp& ocp, Report& report, Clock::time_point deadline);
+  Status converge(const Ocp& ocp, const Iterate& guess, Report& report, Clock::time_point deadline);
+  bool find_tracking_start(const Ocp& ocp, const Iterate& guess, Clock::time_point deadline) noexcept;
+  void begin_within_bounds(const Ocp& ocp) noexcept;  ///< at `current_`
+  void begin_again(const Ocp& ocp, Report& report) noexcept;
   SparseQp::Outcome find_step(const Ocp& ocp, Report& report, Clock::time_point deadline);
   SparseQp::Outcome find_relaxed_step(Clock::time_point deadline);
   SparseQp::Outcome solve_relaxed(double penalty, Clock::time_point deadline);
@@ -95,7 +100,10 @@ class SparseSqp final : public Solver {
   double predicted_slack_cost_ = 0.0;
   bool is_elastic_ = false;  ///< the next QP is relaxed from the start
   StartSearch search_;
-  int futile_ = 0;  ///< relaxed steps since |c|_1 was this:
+  TrackingStart tracking_;
+  Iterate tracking_start_;
+  bool has_looked_for_tracking_ = false, has_tracking_start_ = false;  ///< in this solve; and it was not used yet
+  int futile_ = 0;                                                     ///< relaxed steps since |c|_1 was this:
   double defect_before_ = 0.0;
 };
 

@@ -11,12 +11,14 @@ namespace condensed_test {
 using namespace testing;
 using rhec::testing::Limit;
 using rhec::testing::LimitedOcp;
+using rhec::testing::with_limits;
 using Vector = Eigen::VectorXd;
 using Matrix = Eigen::MatrixXd;
 
-void check_derivatives(const Ocp& ocp, const Iterate& start) {
+void check_derivatives(const Ocp& ocp, const Iterate& start,
+                       const std::shared_ptr<const Feedback>& feedback = nullptr) {
   CondensedProblem problem(ocp);
-  ASSERT_TRUE(problem.take(ocp));
+  ASSERT_TRUE(problem.take(ocp, feedback));
   const Vector x = problem.read(start);
   ASSERT_TRUE(problem.move_to(x));
   const Vector gradient = problem.gradient();
@@ -95,6 +97,53 @@ TEST(CondensedProblem, LimitsAndTheirSlacksHaveTheDerivativesThatDifferencesSay)
   EXPECT_NEAR(problem.objective(), problem.objective_of_iterate(), 1e-12 * problem.objective());
   for (int row = without.rows(); row < problem.rows(); row += 2)
     EXPECT_LE(problem.row_value(row + 1), problem.row_upper()[row + 1] + 1e-12) << "a slack makes room";
+}
+
+/// A controller's problem with bounds of inputs and states, limits of all kinds and a value that is fixed, and a policy
+/// about the simulation of other controls.
+TEST(CondensedProblem, WithAFeedbackHasTheDerivativesThatDifferencesSay) {
+  for (const bool is_blocked : {false, true}) {
+    RandomProblem random(bicycle(), 38);
+    RandomProblem::RhcSpec spec;
+    spec.intervals = 5;
+    if (is_blocked) spec.blocked_inputs = {1};
+    const auto rhc = random.rhc(spec);
+    for (int i = 0; i < 5; ++i) {
+      rhc->input_lower(i, 0) = -3.0;
+      rhc->input_upper(i, 0) = 3.0;
+    }
+    rhc->input_lower(2, 0) = rhc->input_upper(2, 0) = 0.7;
+    std::vector<double> scratch(rhc->scratch_size());
+    rhc->finish(scratch);
+    const int u = rhc->capacity().states;
+    LimitedOcp limited(*rhc, 3);
+    for (int i = 0; i <= 5; ++i) {
+      limited.add(i, {Limit::Kind::distance, {0, 1}, {0.3 * i, -0.4}, 0.5});
+      limited.add(i, {Limit::Kind::linear, {1, 0}, {1.0, -0.3}, -2.0, 1.0, 10.0, 3.0});
+      if (i < 5) limited.add(i, {Limit::Kind::product, {u, 2}, {0.7}, 5.0, infinity, 0.0, 4.0});
+    }
+    Iterate start = with_limits(limited, RandomProblem::cold_start(*rhc));
+    scratch.resize(limited.scratch_size());
+    roll_out(limited, start, scratch);
+    Regulator regulator;
+    regulator.setup(limited);
+    const auto feedback = regulator.about(limited, start, scratch);
+    ASSERT_NE(feedback, nullptr);
+    for (int i = 0; i < 5; ++i) start.control(i)[0] += 0.01 * i;
+    roll_out(limited, start, scratch);
+    check_derivatives(limited, start, feedback);
+    // The same trajectory and the same optimality, in other decisions.
+    CondensedProblem problem(limited), without(limited);
+    ASSERT_TRUE(problem.take(limited, feedback));
+    ASSERT_TRUE(without.take(limited));
+    ASSERT_TRUE(problem.move_to(problem.read(start)));
+    ASSERT_TRUE(without.move_to(without.read(start)));
+    EXPECT_NEAR(problem.objective(), without.objective(), 1e-9 * without.objective());
+    EXPECT_EQ(problem.variables(), without.variables());
+    EXPECT_GE(problem.rows(), without.rows() + 4) << "bounds of controls";
+    Iterate clipped = problem.iterate();
+    EXPECT_EQ(clipped.control(2)[0], 0.7);
+  }
 }
 
 TEST(CondensedProblem, SharesOneSimulationAndOneLinearisationAtAPoint) {

@@ -7,11 +7,18 @@
 
 #include "problems.hpp"
 #include "solvers/nlopt/condensed.hpp"
+#include "support/limited_ocp.hpp"
+#include "support/unstable.hpp"
 
 namespace rhec::nlopt {
 namespace nlopt_solver_test {
 
 using namespace testing;
+using rhec::testing::Limit;
+using rhec::testing::LimitedOcp;
+using rhec::testing::unstable_control;
+using rhec::testing::unstable_guess;
+using rhec::testing::with_limits;
 
 /// x' = x^3 + u, which leaves the numbers within seconds where u is large.
 template <class Scalar>
@@ -138,6 +145,27 @@ TEST(Nlopt, TriesSmallerControlsWhereThoseOfTheGuessLeaveTheNumbers) {
   EXPECT_TRUE(std::isfinite(report.objective));
   EXPECT_EQ(lost.state(0)[0], 1e6);
   for (int i = 1; i <= problem->intervals(); ++i) EXPECT_EQ(lost.state(i)[0], 0.0);
+}
+
+/// Over 40 intervals a deviation grows by ten orders of magnitude, and what the guess leads to by simulation is far
+/// from all limits.
+TEST(Nlopt, FollowsARegulatorsPolicyWhereDynamicsAreUnstable) {
+  const int intervals = 40;
+  const auto problem = unstable_control(intervals);
+  const int u = problem->capacity().states;
+  LimitedOcp limited(*problem, 1);
+  for (int i = 1; i < intervals; ++i) limited.add(i, {Limit::Kind::linear, {0, u}, {1.0, 0.5}, -0.5, 0.5});
+  const auto solver = nlopt_with("{}");
+  solver->setup(limited);
+  Iterate point = with_limits(limited, unstable_guess(*problem));
+  const Report report = solver->solve(point);
+  EXPECT_EQ(report.status, Status::solved) << name_of(report.status);
+  const auto other = host().make_solver("gn_rti", parse_yaml("{mode: converge}", "options"));
+  other->setup(limited);
+  Iterate expected = with_limits(limited, unstable_guess(*problem));
+  const Report reference = other->solve(expected);
+  ASSERT_EQ(reference.status, Status::solved);
+  EXPECT_NEAR(report.objective, reference.objective, 1e-6 * reference.objective);
 }
 
 /// Multipliers of some thousands: a bound violated within the tolerance then is worth a residual beyond it.

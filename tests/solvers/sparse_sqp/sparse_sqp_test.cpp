@@ -22,6 +22,7 @@
 #include "support/limited_ocp.hpp"
 #include "support/random_problem.hpp"
 #include "support/test_models.hpp"
+#include "support/unstable.hpp"
 
 namespace rhec::sparse_sqp {
 namespace sparse_sqp_test {
@@ -29,6 +30,8 @@ namespace sparse_sqp_test {
 using rhec::testing::Limit;
 using rhec::testing::LimitedOcp;
 using rhec::testing::RandomProblem;
+using rhec::testing::unstable_control;
+using rhec::testing::unstable_guess;
 using rhec::testing::with_limits;
 using rhec::testing::WithoutSecondDerivatives;
 using Drive = RandomProblem::Drive;
@@ -479,6 +482,28 @@ TEST(SparseSqp, FindsMultipliersOfManyDependentLimits) {
     solved += report.status == Status::solved && report.iterations < 60;
   }
   EXPECT_GE(solved, 98);  // of 100
+}
+
+/// What the guess leads to by simulation is so far from all limits that linearisations there lead nowhere.
+TEST(SparseSqp, BeginsAgainAtARegulatorsTrajectory) {
+  const int intervals = 60;
+  const auto problem = unstable_control(intervals);
+  const int u = problem->capacity().states;
+  for (const double side : {0.5, 1.0}) {
+    LimitedOcp limited(*problem, 2);
+    for (int i = 1; i < intervals; ++i) {
+      limited.add(i, {Limit::Kind::linear, {0, u}, {1.0, 0.5}, -side, side});
+      limited.add(i, {Limit::Kind::product, {0, u}, {1.0}, -2.0, 2.0});
+    }
+    const auto solver = plugin();
+    solver->setup(limited);
+    Iterate point = with_limits(limited, unstable_guess(*problem));
+    const Report report = solver->solve(point);
+    EXPECT_EQ(report.status, Status::solved) << side << ": " << name_of(report.status);
+    EXPECT_TRUE(report.fallback_used) << side;
+    // What follows the reference costs some 20, and the guess many orders of magnitude more.
+    EXPECT_LT(report.objective, 50.0) << side;
+  }
 }
 
 }  // namespace sparse_sqp_test
