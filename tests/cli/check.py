@@ -231,7 +231,7 @@ class Test(cli.Findings):
         self.expect([finding["check"] for finding in warned] == ["numbers"] and "delta in [" in warned[0]["where"],
                     "bounds over a pole", f"{warned}")
         # Nothing moves a vehicle whose wheels turn in vain.
-        found = self.check("no traction", cli.ROOT / "scenarios" / "unicycle_traction.yaml", *assignments("bounds.mu=[0, 0]"))
+        found = self.check("no traction", cli.ROOT / "scenarios" / "unicycle_traction.yaml", *assignments("bounds.mu=[0, 0]"), code=NOT_SOLVED)
         told = next(finding for finding in found["findings"] if finding["check"] == "straight_motion")
         self.expect(told["verdict"] == "warn" and "no inputs give that speed at mu 0" in told["found"], "no traction", f"{told}")
         # The steering angle is not enough to find a vehicle by.
