@@ -34,6 +34,11 @@ void print_signals(const logs::Drive& drive) {
                drive.origin->longitude, drive.origin->height);
 }
 
+/// A statistic, or a dash where there was nothing to make it of.
+std::string told(double value, const char* format) {
+  return std::isnan(value) ? "-" : fmt::format(fmt::runtime(format), value);
+}
+
 void print_innovations(const sim::DriveReplay& replay, const Robot& robot) {
   fmt::print("\n{}: {} estimates, {} fallbacks, {:.2f} s\n", replay.name, replay.estimates.size(),
              replay.counts.fallbacks, replay.seconds);
@@ -46,10 +51,10 @@ void print_innovations(const sim::DriveReplay& replay, const Robot& robot) {
   for (const sim::SensorSummary& sensor : sim::summarise_innovations(replay, robot)) {
     std::string outputs;
     for (const sim::SensorSummary::Output& output : sensor.outputs)
-      outputs += fmt::format("{}{:.3g} / {:.3g} {}, {:.2f}", outputs.empty() ? "" : "; ", output.rms, output.expected,
-                             output.unit, output.correlation);
-    fmt::print("{:<24} {:>8} {:>8} {:>8.2f} {:>8.2f}   {}\n", sensor.name, sensor.used, sensor.rejected, sensor.nis,
-               sensor.expected, outputs);
+      outputs += fmt::format("{}{} / {} {}, {}", outputs.empty() ? "" : "; ", told(output.rms, "{:.3g}"),
+                             told(output.expected, "{:.3g}"), output.unit, told(output.correlation, "{:.2f}"));
+    fmt::print("{:<24} {:>8} {:>8} {:>8} {:>8.2f}   {}\n", sensor.name, sensor.used, sensor.rejected,
+               told(sensor.nis, "{:.2f}"), sensor.expected, outputs);
   }
 }
 
@@ -112,7 +117,7 @@ int estimate_drive(const LogArguments& arguments, const TrackArguments& track_ar
     if (!arguments.json) {
       print_innovations(result.all, variant.robot);
       print_accuracy(result.withheld, variant.robot, input.hold_out);
-      print_integration(result.all.counts, *variant.robot.model(), variant.name + ": ");
+      print_integration(result.all.counts, variant.robot, variant.name + ": ");
     }
     all_usable = all_usable && result.all.counts.fallbacks == 0;
     results.push_back(std::move(result));

@@ -27,7 +27,7 @@ struct EstimateArguments : LogArguments {
   TrackArguments tracks;
 };
 
-void print_table(const sim::RecordedLog& log, const Model& model, const std::vector<sim::Replay>& replays,
+void print_table(const sim::RecordedLog& log, const Robot& robot, const std::vector<sim::Replay>& replays,
                  const sim::HoldOut& hold_out, const std::filesystem::path& folder) {
   const double seconds = log.rows.back().time - log.rows.front().time;
   fmt::print("{} rows of dead reckoning, {} fixes, {:.1f} min\n", log.rows.size(), log.fixes.size(), seconds / 60.0);
@@ -49,7 +49,7 @@ void print_table(const sim::RecordedLog& log, const Model& model, const std::vec
                  summary.consistent.rmse_capped);
     fmt::print("{:>8} {:>9} {:>6.2f} s\n", replays[i].counts.nodes, replays[i].counts.fallbacks, replays[i].seconds);
   }
-  for (const sim::Replay& replay : replays) print_integration(replay.counts, model, replay.name + ": ");
+  for (const sim::Replay& replay : replays) print_integration(replay.counts, robot, replay.name + ": ");
   fmt::print("\npictures and numbers: {}\n", folder.string());
 }
 
@@ -113,7 +113,7 @@ int estimate_log(const EstimateArguments& arguments) {
   if (arguments.json) {
     print_json(summary, folder.path());
   } else {
-    print_table(log, *scenario.variants().front().robot.model(), replays, hold_out, folder.path());
+    print_table(log, scenario.variants().front().robot, replays, hold_out, folder.path());
     dump.tell(arguments.plugin_path);
   }
   return all_usable ? exit_fine : exit_not_solved;

@@ -133,7 +133,7 @@ void print_table(const sim::RunSummary& summary, const sim::Scenario& scenario, 
   fmt::print("\n{} steps: {}; {} of {} solves fell back\n", summary.steps, summary.ended, summary.fallbacks,
              summary.solves);
   print_health(summary);
-  print_integration(summary.counts, *scenario.robot().model());
+  print_integration(summary.counts, scenario.robot());
   fmt::print("pictures and numbers: {}\n", folder.string());
 }
 

@@ -89,11 +89,12 @@ const OptionTable<CheckOptions>& CheckOptions::table() {
   static const auto rows =
       OptionTable<CheckOptions>()
           .number("behind", &CheckOptions::behind, "a message whose stamp is older than this is refused [s]",
-                  greater_than(0.0))
-          .number("ahead", &CheckOptions::ahead, "a message from further in the future is refused [s]", at_least(0.0))
+                  or_infinite(greater_than(0.0)))
+          .number("ahead", &CheckOptions::ahead, "a message from further in the future is refused [s]",
+                  or_infinite(at_least(0.0)))
           .number("fix_sigma", &CheckOptions::fix_sigma,
                   "a fix that states a larger standard deviation is refused; one that states none is used [m]",
-                  greater_than(0.0));
+                  or_infinite(greater_than(0.0)));
   return rows;
 }
 

@@ -97,6 +97,16 @@ void check_new_name(const std::string& name, const std::vector<std::string>& kno
 double NumberValue::read(const Settings& from, const OptionContext& context) const {
   const auto value = from.number();
   if (!value || !range.contains(*value)) throw wrong_option(from, type(), constraint(), context);
+  if (std::isinf(*value)) {
+    if (!range.may_be_infinite) throw wrong_option(from, "finite number", constraint(), context);
+    return *value;
+  }
+  const double magnitude = std::abs(*value);
+  if (magnitude > 0.0 && !(magnitude >= Range::least_magnitude && magnitude <= Range::most_magnitude))
+    throw wrong_option(from,
+                       fmt::format("number{} of a magnitude between {:g} and {:g}", range.contains(0.0) ? ", 0 or" : "",
+                                   Range::least_magnitude, Range::most_magnitude),
+                       constraint(), context);
   return *value;
 }
 

@@ -24,9 +24,10 @@ struct BicycleSideslip {
 
   template <class Visitor>
   void options(Visitor&& option) {
-    option("wheelbase", wheelbase, "distance of the axles [m]", greater_than(0.0));
-    option("antenna_x", antenna_x, "how far the GPS antenna is before the rear axle [m]; negative: behind it");
-    option("antenna_y", antenna_y, "how far it is to the left [m]; negative: to the right");
+    option("wheelbase", wheelbase, "distance of the axles [m]", between(1e-3, 1e3));
+    option("antenna_x", antenna_x, "how far the GPS antenna is before the rear axle [m]; negative: behind it",
+           between(-1e3, 1e3));
+    option("antenna_y", antenna_y, "how far it is to the left [m]; negative: to the right", between(-1e3, 1e3));
   }
 
   void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {

@@ -22,8 +22,9 @@ struct BicycleSlip {
 
   template <class Visitor>
   void options(Visitor&& option) {
-    option("wheelbase", wheelbase, "distance of the axles [m]", greater_than(0.0));
-    option("gps_offset", gps_offset, "how far the GPS antenna is behind the rear axle [m]; negative: before it");
+    option("wheelbase", wheelbase, "distance of the axles [m]", between(1e-3, 1e3));
+    option("gps_offset", gps_offset, "how far the GPS antenna is behind the rear axle [m]; negative: before it",
+           between(-1e3, 1e3));
   }
 
   void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {

@@ -25,10 +25,11 @@ struct SkidSteer {
 
   template <class Visitor>
   void options(Visitor&& option) {
-    option("wheel_radius", wheel_radius, "of the wheels [m]", greater_than(0.0));
-    option("track_width", track_width, "between the wheels of both sides [m]", greater_than(0.0));
-    option("antenna_x", antenna_x, "how far the GPS antenna is before the centre [m]; negative: behind it");
-    option("antenna_y", antenna_y, "how far it is to the left [m]; negative: to the right");
+    option("wheel_radius", wheel_radius, "of the wheels [m]", between(1e-3, 1e3));
+    option("track_width", track_width, "between the wheels of both sides [m]", between(1e-3, 1e3));
+    option("antenna_x", antenna_x, "how far the GPS antenna is before the centre [m]; negative: behind it",
+           between(-1e3, 1e3));
+    option("antenna_y", antenna_y, "how far it is to the left [m]; negative: to the right", between(-1e3, 1e3));
   }
 
   void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {

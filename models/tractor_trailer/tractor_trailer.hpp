@@ -38,13 +38,16 @@ struct TractorTrailer {
 
   template <class Visitor>
   void options(Visitor&& option) {
-    option("wheelbase", wheelbase, "distance of the tractor's axles [m]", greater_than(0.0));
-    option("trailer_length", trailer_length, "from the hitch to the trailer's axle [m]", greater_than(0.0));
-    option("hitch", hitch, "how far the hitch is behind the tractor's rear axle [m]; negative: before it");
-    option("tractor_antenna_x", tractor_antenna_x, "how far the tractor's antenna is before its rear axle [m]");
-    option("tractor_antenna_y", tractor_antenna_y, "how far it is to the left [m]");
-    option("trailer_antenna_x", trailer_antenna_x, "how far the trailer's antenna is before its axle [m]");
-    option("trailer_antenna_y", trailer_antenna_y, "how far it is to the left [m]");
+    option("wheelbase", wheelbase, "distance of the tractor's axles [m]", between(1e-3, 1e3));
+    option("trailer_length", trailer_length, "from the hitch to the trailer's axle [m]", between(1e-3, 1e3));
+    option("hitch", hitch, "how far the hitch is behind the tractor's rear axle [m]; negative: before it",
+           between(-1e3, 1e3));
+    option("tractor_antenna_x", tractor_antenna_x, "how far the tractor's antenna is before its rear axle [m]",
+           between(-1e3, 1e3));
+    option("tractor_antenna_y", tractor_antenna_y, "how far it is to the left [m]", between(-1e3, 1e3));
+    option("trailer_antenna_x", trailer_antenna_x, "how far the trailer's antenna is before its axle [m]",
+           between(-1e3, 1e3));
+    option("trailer_antenna_y", trailer_antenna_y, "how far it is to the left [m]", between(-1e3, 1e3));
   }
 
   void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {

@@ -22,8 +22,9 @@ struct UnicycleTraction {
 
   template <class Visitor>
   void options(Visitor&& option) {
-    option("antenna_x", antenna_x, "how far the GPS antenna is before the centre [m]; negative: behind it");
-    option("antenna_y", antenna_y, "how far it is to the left [m]; negative: to the right");
+    option("antenna_x", antenna_x, "how far the GPS antenna is before the centre [m]; negative: behind it",
+           between(-1e3, 1e3));
+    option("antenna_y", antenna_y, "how far it is to the left [m]; negative: to the right", between(-1e3, 1e3));
   }
 
   void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {

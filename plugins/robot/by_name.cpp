@@ -8,19 +8,16 @@
 
 namespace rhec {
 
-double FiniteValue::read(const Settings& from, const OptionContext& context) const {
-  const double number = NumberValue{range}.read(from, context);
-  if (!std::isfinite(number)) throw from.mismatch("a finite number");
-  return number;
-}
-
 double SigmaValue::read(const Settings& from, const OptionContext& context) const {
-  constexpr double least = 1e-100, most = 1e100;
-  const double sigma = FiniteValue{range}.read(from, context);
-  if (sigma != 0.0 && !(sigma >= least && sigma <= most))
+  const auto given = from.number();
+  const bool is_wrong =
+      given && std::isfinite(*given) && *given != 0.0 && range.contains(*given) && !(*given >= least && *given <= most);
+  if (is_wrong)
     throw from.mismatch(
-        fmt::format("a standard deviation between {:g} and {:g}, whose square is a number", least, most));
-  return sigma;
+        fmt::format("a standard deviation between {:g} and {:g}, in the variable's unit{}; what is known "
+                    "better or worse than that is not told from what is certain or unknown",
+                    least, most, range.contains(0.0) ? ", or 0" : ""));
+  return NumberValue{range}.read(from, context);
 }
 
 std::pair<double, double> BoundsValue::read(const Settings& from, const OptionContext&) const {
@@ -30,6 +27,12 @@ std::pair<double, double> BoundsValue::read(const Settings& from, const OptionCo
   const double low = first.is_null() ? -infinity : first.as_number();
   const double high = second.is_null() ? infinity : second.as_number();
   if (!(low <= high)) throw from.error(fmt::format("found [{}, {}], expected lower <= upper", low, high));
+  const auto is_usable = [](double bound, double none) {
+    return bound == none || bound == 0.0 || (std::abs(bound) >= Range::least_magnitude && std::abs(bound) <= farthest);
+  };
+  if (!is_usable(low, -infinity) || !is_usable(high, infinity))
+    throw from.error(fmt::format("found [{}, {}], expected bounds of a magnitude of at most {:g}, or null for none",
+                                 low, high, farthest));
   return {low, high};
 }
 

@@ -139,8 +139,8 @@ const OptionTable<ControllerOptions>& ControllerOptions::table() {
                   greater_than(0.0))
           .number("speed_bound_factor", &C::speed_bound_factor,
                   "a wheel speed that is an input is at most this times the reference plus speed_bound_offset",
-                  at_least(0.0))
-          .number("speed_bound_offset", &C::speed_bound_offset, "[m/s]", at_least(0.0))
+                  or_infinite(at_least(0.0)))
+          .number("speed_bound_offset", &C::speed_bound_offset, "[m/s]", or_infinite(at_least(0.0)))
           .map("weights", &C::weights, WeightOptions::table().schema())
           .map("rate_bounds", &C::rate_bounds, rate_bounds_by_name().rows())
           .group("health", &C::health, PaceOptions::table())

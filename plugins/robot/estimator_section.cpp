@@ -1,5 +1,6 @@
 #include "rhec/plugins/robot/estimator_section.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <span>
@@ -22,6 +23,7 @@ namespace rhec {
 namespace {
 
 constexpr double state_share = 0.1, parameter_share = 1.0;  // of a variable's typical magnitude
+constexpr double farthest_start = BoundsValue::farthest;
 
 struct ArrivalOptions {
   ArrivalKind name = RecedingHorizonEstimation::Setup{}.arrival;
@@ -55,7 +57,7 @@ const SigmasByName& restart_sigma_by_name() {
 
 const ByName<NumberValue>& block_sigma_by_name() {
   static const ByName<NumberValue> map(
-      "block_sigma", {greater_than(0.0)},
+      "block_sigma", {or_infinite(greater_than(0.0))},
       {{"PARAMETER", &ModelDescription::parameters, constant_default(ParameterWalk{}.block_sigma),
         "standard deviation of an unlinked block inside the window about the block before; .inf: none, as in the "
         "paper"}});
@@ -76,7 +78,7 @@ DefaultByName<double> at_the_origin() {
 }
 
 const NumbersByName& initial_state_by_name() {
-  static const NumbersByName map("initial state", {any()},
+  static const NumbersByName map("initial state", {between(-farthest_start, farthest_start)},
                                  {{"STATE", &ModelDescription::states, at_the_origin(), "mean at the start"}});
   return map;
 }
@@ -88,7 +90,7 @@ DefaultByName<double> middle_of_bounds() {
 
 const NumbersByName& initial_parameters_by_name() {
   static const NumbersByName map(
-      "initial parameters", {any()},
+      "initial parameters", {between(-farthest_start, farthest_start)},
       {{"PARAMETER", &ModelDescription::parameters, middle_of_bounds(), "mean at the start"}});
   return map;
 }
@@ -113,6 +115,29 @@ struct InitialOptions {
     return rows;
   }
 };
+
+/// Of a start so far outside of its bounds every estimate is one that no measurement agrees with. A log's first
+/// measurements may be wrong, so that of a start that nobody gave the position alone counts.
+void require_start_within_bounds(const EstimatorParts& parts) {
+  constexpr double most_sigmas = 10.0;
+  const Settings* const initial = parts.section.find("initial");
+  const Settings* const given = initial ? initial->find("state") : nullptr;
+  const std::vector<Variable>& states = parts.context->about.states;
+  const Roles& roles = parts.context->about.roles;
+  for (int j = 0; j < std::ssize(states); ++j) {
+    const Variable& state = states[static_cast<std::size_t>(j)];
+    const Settings* const place = given ? given->find(state.name) : nullptr;
+    const double start = parts.initial_mean[j], sigma = std::sqrt(parts.initial_covariance(j, j)),
+                 outside = std::max(state.lower - start, start - state.upper);
+    if (!place && roles.position_x != j && roles.position_y != j) continue;
+    if (!(outside > most_sigmas * sigma)) continue;
+    throw(place ? *place : parts.section)
+        .error(fmt::format(
+            "bounds.{0}: [{1:.6g}, {2:.6g}] leave out the start, {3:.6g} {4}, whose standard deviation is {5:.3g} {4}; "
+            "expected bounds that hold it, or estimator.initial.state.{0} between them",
+            state.name, state.lower, state.upper, start, state.unit, sigma));
+  }
+}
 
 }  // namespace
 
@@ -243,6 +268,7 @@ PluginChoice EstimatorSection::solver_choice() const { return default_solver.cho
 EstimatorParts EstimatorSection::parts(const std::optional<Eigen::VectorXd>& initial_state) const {
   EstimatorParts parts = parts_;
   if (initial_state && !has_initial_state_) parts.initial_mean.head(initial_state->size()) = *initial_state;
+  require_start_within_bounds(parts);
   return parts;
 }
 

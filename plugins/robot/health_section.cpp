@@ -17,13 +17,15 @@ const OptionTable<HealthOptions>& HealthOptions::table() {
                 "whether angles and the like that are off by little for long are found, and what they are off by taken "
                 "out of what is measured")
           .number("gate", &H::gate, "a measurement that is less probable than so many standard deviations is not used",
-                  greater_than(0.0))
+                  or_infinite(greater_than(0.0)))
           .integer("proof", &H::proof, "samples that a sensor must have jumped for before the estimate follows it",
                    between(2, 10000))
           .number("lost_position", &H::lost_position,
-                  "standard deviation of the position above which the vehicle is lost [m]", greater_than(0.0))
+                  "standard deviation of the position above which the vehicle is lost [m]",
+                  or_infinite(greater_than(0.0)))
           .number("lost_heading", &H::lost_heading,
-                  "standard deviation of the heading above which the vehicle is lost [rad]", greater_than(0.0));
+                  "standard deviation of the heading above which the vehicle is lost [rad]",
+                  or_infinite(greater_than(0.0)));
   return rows;
 }
 

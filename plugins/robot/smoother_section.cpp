@@ -29,7 +29,8 @@ const OptionTable<SmootherOptions>& SmootherOptions::table() {
   static const auto rows =
       OptionTable<S>()
           .number("deadline", &S::deadline,
-                  "the solver stops after so long, with the best that it has; .inf: never [s]", greater_than(0.0))
+                  "the solver stops after so long, with the best that it has; .inf: never [s]",
+                  or_infinite(greater_than(0.0)))
           .map("blocking", &S::blocking, {BlockingSection::row("as in `blocking`")})
           .map("priors", &S::priors, priors_rows())
           .integer(

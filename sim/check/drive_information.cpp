@@ -92,20 +92,17 @@ std::vector<std::string> Drives::combinations(Matrix null_space, int errors) con
   return sorted;
 }
 
-DriveInformation Drives::information(const Drive& drive, bool with_errors) const {
+Drives::Root Drives::root(const Drive& drive, bool with_errors) const {
   const std::vector<int>&biased = checked_.options.biased, &scaled = checked_.options.scaled;
   const int biases = with_errors ? static_cast<int>(biased.size()) : 0,
             errors = biases + (with_errors ? static_cast<int>(scaled.size()) : 0);
   const int blocks = static_cast<int>(blocks_.parameter_of.size()), first_block = nx_ + errors,
             unknowns = first_block + blocks, steps = nu_ * intervals_, rows = ny_ * (intervals_ + 1);
-  DriveInformation found;
-  found.name = drive.name;
-  found.meaning = drive.meaning;
+  Root found;
+  found.errors = errors;
   found.unusable = drive.unusable;
-  found.unknowns = unknowns;
-  found.parameter_sigma.assign(np_, infinity);
-  found.state_determined.assign(nx_, false);
-  found.error_sigma.assign(errors, infinity);
+  found.matrix = Matrix::Zero(unknowns, unknowns);
+  found.scales = Vector::Ones(unknowns);
   if (!drive.unusable.empty()) return found;
 
   // Unknowns in scales, inputs in standard deviations, rows in standard deviations: [inputs, unknowns] of the outputs,
@@ -114,7 +111,7 @@ DriveInformation Drives::information(const Drive& drive, bool with_errors) const
   const auto noise = [](double sigma, double scale) {
     return std::clamp(sigma, least_sigma * scale, scale / least_sigma);
   };
-  Vector scales(unknowns);
+  Vector& scales = found.scales;
   for (int j = 0; j < nx_; ++j) scales[j] = about_.states[j].scale;
   for (int e = 0; e < errors; ++e) scales[nx_ + e] = e < biases ? about_.outputs[biased[e]].scale : 1.0;
   for (int b = 0; b < blocks; ++b) scales[first_block + b] = about_.parameters[blocks_.parameter_of[b]].scale;
@@ -159,15 +156,55 @@ DriveInformation Drives::information(const Drive& drive, bool with_errors) const
     found.unusable = "its sensitivities are not finite";
     return found;
   }
-  Matrix root = Matrix::Zero(unknowns, unknowns);
   const Matrix factor = triangle_of(stacked);
   const Eigen::Index height = std::min<Eigen::Index>(unknowns, factor.rows() - steps);
-  root.topRows(height) = factor.block(steps, steps, height, unknowns).template triangularView<Eigen::Upper>();
+  found.matrix.topRows(height) = factor.block(steps, steps, height, unknowns).template triangularView<Eigen::Upper>();
 
-  const Eigen::JacobiSVD<Matrix, Eigen::NoQRPreconditioner> svd(root, Eigen::ComputeFullV);
+  if (!found.matrix.allFinite()) found.unusable = "its sensitivities are not finite";
+  return found;
+}
+
+Eigen::MatrixXd Drives::about_errors(const Root& root) const {
+  if (!root.unusable.empty() || root.errors == 0) return Matrix::Zero(0, root.errors);
+  const Eigen::Index unknowns = root.matrix.cols(), own = unknowns - root.errors, blocks = own - nx_;
+  Matrix reordered(unknowns, unknowns);
+  reordered << root.matrix.leftCols(nx_), root.matrix.rightCols(blocks), root.matrix.middleCols(nx_, root.errors);
+  const Matrix triangle = triangle_of(reordered).triangularView<Eigen::Upper>();
+  // What is left of the errors' columns beside all that the drive's own unknowns can explain: below their triangle, and
+  // where that has no rank.
+  const Eigen::JacobiSVD<Matrix, Eigen::NoQRPreconditioner> svd(triangle.topLeftCorner(own, own), Eigen::ComputeFullU);
+  const Vector& values = svd.singularValues();
+  Eigen::Index rank = 0;
+  while (rank < own && values[rank] > rank_threshold * values[0]) ++rank;
+  Matrix left(unknowns - rank, root.errors);
+  left << svd.matrixU().rightCols(own - rank).transpose() * triangle.topRightCorner(own, root.errors),
+      triangle.bottomRightCorner(root.errors, root.errors);
+  return left;
+}
+
+DriveInformation Drives::information(const Drive& drive, const Root& root, const Eigen::MatrixXd& elsewhere) const {
+  const int errors = root.errors, first_block = nx_ + errors, unknowns = static_cast<int>(root.scales.size()),
+            blocks = unknowns - first_block;
+  const Vector& scales = root.scales;
+  DriveInformation found;
+  found.name = drive.name;
+  found.meaning = drive.meaning;
+  found.unusable = root.unusable;
+  found.unknowns = unknowns;
+  found.parameter_sigma.assign(np_, infinity);
+  found.state_determined.assign(nx_, false);
+  found.error_sigma.assign(errors, infinity);
+  if (!found.unusable.empty()) return found;
+  Matrix all = Matrix::Zero(unknowns + elsewhere.rows(), unknowns);
+  all.topRows(unknowns) = root.matrix;
+  if (elsewhere.rows() > 0) all.bottomRows(elsewhere.rows()).middleCols(nx_, errors) = elsewhere;
+  // The singular values and right directions of a matrix are those of its triangle.
+  const Matrix triangle = triangle_of(all).topRows(unknowns).triangularView<Eigen::Upper>();
+
+  const Eigen::JacobiSVD<Matrix, Eigen::NoQRPreconditioner> svd(triangle, Eigen::ComputeFullV);
   const Vector& values = svd.singularValues();
   // Squares of sensitivities that are finite need not be.
-  if (!root.allFinite() || !values.allFinite() || !svd.matrixV().allFinite()) {
+  if (!values.allFinite() || !svd.matrixV().allFinite()) {
     found.unusable = "its sensitivities are not finite";
     return found;
   }

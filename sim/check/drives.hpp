@@ -33,8 +33,20 @@ class Drives {
   explicit Drives(const CheckedModel& checked);
 
   std::vector<Drive> all();
+  /// The square root of the information about the unknowns of a drive [state; errors; blocks of parameters], in scales.
+  /// `errors`: of the sensors' errors that are among the unknowns.
+  struct Root {
+    std::string unusable;
+    int errors = 0;
+    Eigen::MatrixXd matrix;
+    Eigen::VectorXd scales;
+  };
   /// With or without the errors of sensors that the options name among the unknowns.
-  DriveInformation information(const Drive& drive, bool with_errors = false) const;
+  Root root(const Drive& drive, bool with_errors) const;
+  /// What a drive tells of the errors of sensors whatever its own start and slip are: a square root of that, in scales.
+  Eigen::MatrixXd about_errors(const Root& root) const;
+  /// `elsewhere`: rows that other drives of the same sensors add about their errors, of `about_errors`.
+  DriveInformation information(const Drive& drive, const Root& root, const Eigen::MatrixXd& elsewhere = {}) const;
   /// "yaw_rate_bias", "ground_speed_scale": the errors in the order of DriveInformation::error_sigma.
   std::vector<std::string> names_of_errors() const;
   /// The largest condition number of the Jacobians of F along a drive, in scales.

@@ -61,6 +61,11 @@ void require_fitting(const Model& model, const ModelDescription& within, const M
       if (j < 0 || j >= std::ssize(within.outputs))
         throw Error(fmt::format("check of a model: an error of output {}; it has {} outputs, from 0 on", j,
                                 within.outputs.size()));
+  const auto is_partial = [](const std::vector<int>& which, const std::vector<double>& sigmas) {
+    return !sigmas.empty() && sigmas.size() != which.size();
+  };
+  if (is_partial(options.biased, options.bias_sigmas) || is_partial(options.scaled, options.scale_sigmas))
+    throw Error("check of a model: give a standard deviation for each of the biases and scale errors, or none");
   if (!options.blockings.empty() && options.blockings.size() != within.parameters.size())
     throw Error(fmt::format("check of a model: {} blockings for {} parameters", options.blockings.size(),
                             within.parameters.size()));
@@ -253,9 +258,15 @@ ModelCheck check_model(const Host& host, const Robot& robot, ModelCheckOptions o
   options.input_sigmas = robot.input_sigmas();
   options.blockings = robot.make_blockings();
   for (std::size_t j = 0; j < robot.output_biases().size(); ++j)
-    if (robot.output_biases()[j].sigma > 0.0) options.biased.push_back(static_cast<int>(j));
+    if (robot.output_biases()[j].sigma > 0.0) {
+      options.biased.push_back(static_cast<int>(j));
+      options.bias_sigmas.push_back(robot.output_biases()[j].sigma);
+    }
   for (std::size_t j = 0; j < robot.output_scales().size(); ++j)
-    if (robot.output_scales()[j].sigma > 0.0) options.scaled.push_back(static_cast<int>(j));
+    if (robot.output_scales()[j].sigma > 0.0) {
+      options.scaled.push_back(static_cast<int>(j));
+      options.scale_sigmas.push_back(robot.output_scales()[j].sigma);
+    }
   // The robot's own model is shared; its instruction set must not change.
   const PluginChoice choice = robot.model_choice();
   std::shared_ptr<Model> model = host.make_model(choice.name, choice.options);

@@ -336,6 +336,10 @@ std::vector<Finding> check_straight_motion(const CheckedModel& checked) {
     where.clear();
     for (std::size_t j = 0; j < p.size(); ++j) where += fmt::format(" {} {:.3g}", about.parameters[j].name, p[j]);
   }
+  if (std::isinf(worst) && findings.empty())
+    findings.warn("at other parameters",
+                  fmt::format("asked for {:.4g} m/s, no inputs give that speed at{}", speed, where),
+                  "leave parameters at which the vehicle cannot move out of the bounds", {{"asked", speed}});
   if (!(worst <= rough) && findings.empty())
     findings.warn(
         "at other parameters",

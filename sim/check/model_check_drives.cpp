@@ -201,44 +201,112 @@ std::string combination_with(const std::vector<DriveInformation>& drives, const 
   return name;
 }
 
-/// Errors of sensors that no drive tells from the state, from slip, or from each other, and slip that no drive tells
-/// from them.
-std::vector<Finding> judge_errors(const CheckedModel& checked, const std::vector<std::string>& names,
-                                  const std::vector<DriveInformation>& without,
-                                  const std::vector<DriveInformation>& drives) {
+/// The combination that is known least, of the first drive where that has something to do with it.
+std::string weakest_with(const std::vector<DriveInformation>& drives, const std::string& name) {
+  for (const DriveInformation& drive : drives)
+    if (drive.weakest == name || drive.weakest.find(' ' + name) != std::string::npos)
+      return fmt::format("{} (on '{}')", drive.weakest, drive.name);
+  return name;
+}
+
+/// Of the errors of sensors: what each drive tells by itself, and with what the other drives tell of the same sensors.
+struct ErrorInformation {
+  std::vector<std::string> names;
+  std::vector<double>
+      known;  ///< by error: its standard deviation before anything is measured; infinite: nothing is known
+  std::vector<DriveInformation> alone, together;
+};
+
+double best_of(const std::vector<DriveInformation>& drives, std::vector<double> DriveInformation::*sigmas,
+               std::size_t index) {
+  double best = infinity;
+  for (const DriveInformation& drive : drives)
+    if (drive.unusable.empty()) best = std::min(best, (drive.*sigmas)[index]);
+  return best;
+}
+
+/// "(standing)": the drives that tell an error by themselves; empty if all do.
+std::string told_on(const ErrorInformation& about, std::size_t error) {
+  std::vector<std::string> on;
+  std::size_t usable = 0;
+  for (const DriveInformation& drive : about.alone) {
+    if (!drive.unusable.empty()) continue;
+    ++usable;
+    if (drive.error_sigma[error] < about.known[error]) on.push_back(drive.name);
+  }
+  if (on.size() == usable) return {};
+  return on.empty() ? " (by several drives together)" : fmt::format(" ({})", fmt::join(on, ", "));
+}
+
+/// Errors of sensors that the drives do not tell from the state, from slip, or from each other, and slip that no drive
+/// tells from them. Sensors keep their errors from drive to drive, where starts and slip are others.
+std::vector<Finding> judge_errors(const CheckedModel& checked, const ErrorInformation& about,
+                                  const std::vector<DriveInformation>& without, double duration) {
   FindingList findings("observability");
   std::vector<std::string> notes;
   const auto is_usable = [](const DriveInformation& drive) { return drive.unusable.empty(); };
-  if (std::none_of(drives.begin(), drives.end(), is_usable)) return findings.take();
-  const auto best_of = [](const std::vector<DriveInformation>& all, const auto& sigma_of) {
-    double best = infinity;
-    for (const DriveInformation& drive : all)
-      if (drive.unusable.empty()) best = std::min(best, sigma_of(drive));
-    return best;
-  };
-  for (std::size_t e = 0; e < names.size(); ++e) {
-    const double best = best_of(drives, [&](const DriveInformation& drive) { return drive.error_sigma[e]; });
-    if (std::isfinite(best)) {
-      notes.push_back(fmt::format("{} to {:.2g}", names[e], best));
-      continue;
-    }
-    findings.warn(names[e],
-                  fmt::format("no drive tells it without a prior; what the data cannot separate: {}",
-                              combination_with(drives, names[e])),
-                  "it stays as uncertain as its sigma and the start are: leave it out, or measure what it is confused "
-                  "with by another sensor");
+  if (std::none_of(about.together.begin(), about.together.end(), is_usable)) return findings.take();
+  for (std::size_t e = 0; e < about.names.size(); ++e) {
+    const std::string& name = about.names[e];
+    const double best = best_of(about.together, &DriveInformation::error_sigma, e);
+    if (!std::isfinite(best))
+      findings.warn(name,
+                    fmt::format("no drive tells it without a prior; what the data cannot separate: {}",
+                                combination_with(about.together, name)),
+                    "it stays as uncertain as its sigma and the start are: leave it out, or measure what it is "
+                    "confused with by another sensor");
+    else if (best > about.known[e])
+      findings.warn(
+          name,
+          fmt::format("one horizon of {:.3g} s of each drive leaves a standard deviation of {:.3g}, more than "
+                      "the {:.3g} that is known before; what the data hardly separate: {}",
+                      duration, best, about.known[e], weakest_with(about.together, name)),
+          "it stays about as uncertain as its sigma, and is learned over many horizons at best: leave it out, "
+          "or measure what it is confused with by another sensor",
+          {{"sigma", best}, {"known", about.known[e]}});
+    else
+      notes.push_back(fmt::format("{} to {:.2g}{}", name, best, told_on(about, e)));
   }
   for (std::size_t j = 0; j < checked.about.parameters.size(); ++j) {
-    const auto sigma_of = [j](const DriveInformation& drive) { return drive.parameter_sigma[j]; };
-    if (!std::isfinite(best_of(without, sigma_of)) || std::isfinite(best_of(drives, sigma_of))) continue;
+    if (!std::isfinite(best_of(without, &DriveInformation::parameter_sigma, j)) ||
+        std::isfinite(best_of(about.together, &DriveInformation::parameter_sigma, j)))
+      continue;
     const std::string& name = checked.about.parameters[j].name;
     findings.warn(fmt::format("parameter {}", name),
                   fmt::format("no drive tells it beside the errors of sensors; what the data cannot separate: {}",
-                              combination_with(drives, name)),
+                              combination_with(about.together, name)),
                   "give one of the errors up, or measure what tells them apart");
   }
   if (!notes.empty()) findings.pass(fmt::format("errors of sensors, over one horizon: {}", fmt::join(notes, "; ")));
   return findings.take();
+}
+
+ErrorInformation information_about_errors(const CheckedModel& checked, const Drives& maker,
+                                          const std::vector<Drive>& driven) {
+  ErrorInformation about;
+  about.names = maker.names_of_errors();
+  const auto add_known = [&about](const std::vector<int>& which, const std::vector<double>& sigmas) {
+    for (std::size_t j = 0; j < which.size(); ++j) about.known.push_back(sigmas.empty() ? infinity : sigmas[j]);
+  };
+  add_known(checked.options.biased, checked.options.bias_sigmas);
+  add_known(checked.options.scaled, checked.options.scale_sigmas);
+  std::vector<Drives::Root> roots;
+  std::vector<Matrix> told;
+  for (const Drive& drive : driven) {
+    roots.push_back(maker.root(drive, true));
+    told.push_back(maker.about_errors(roots.back()));
+    about.alone.push_back(maker.information(drive, roots.back()));
+  }
+  for (std::size_t d = 0; d < driven.size(); ++d) {
+    Matrix elsewhere(0, std::ssize(about.names));
+    for (std::size_t other = 0; other < driven.size(); ++other) {
+      if (other == d) continue;
+      elsewhere.conservativeResize(elsewhere.rows() + told[other].rows(), Eigen::NoChange);
+      elsewhere.bottomRows(told[other].rows()) = told[other];
+    }
+    about.together.push_back(maker.information(driven[d], roots[d], elsewhere));
+  }
+  return about;
 }
 
 }  // namespace
@@ -249,17 +317,15 @@ std::vector<Finding> check_drives(const CheckedModel& checked, std::vector<Drive
   ScaleCheck scaling(checked, maker);
   for (const Drive& drive : driven) {
     scaling.look_at(drive);
-    drives.push_back(maker.information(drive));
+    drives.push_back(maker.information(drive, maker.root(drive, false)));
   }
   std::vector<Finding> findings = scaling.findings();
   for (Finding& finding : judge_observability(checked, drives, maker.duration()))
     findings.push_back(std::move(finding));
-  const std::vector<std::string> errors = maker.names_of_errors();
-  if (errors.empty()) return findings;
-  std::vector<DriveInformation> with_errors;
-  with_errors.reserve(driven.size());
-  for (const Drive& drive : driven) with_errors.push_back(maker.information(drive, true));
-  for (Finding& finding : judge_errors(checked, errors, drives, with_errors)) findings.push_back(std::move(finding));
+  if (maker.names_of_errors().empty()) return findings;
+  const ErrorInformation about = information_about_errors(checked, maker, driven);
+  for (Finding& finding : judge_errors(checked, about, drives, maker.duration()))
+    findings.push_back(std::move(finding));
   return findings;
 }
 

@@ -14,6 +14,7 @@
 #include "rhec/core/base/error.hpp"
 #include "rhec/plugins/equations/equations.hpp"
 #include "rhec/plugins/host/host.hpp"
+#include "rhec/plugins/robot/plugin_option.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
 #include "samples.hpp"
 #include "term_checks.hpp"
@@ -412,7 +413,10 @@ MadeTerm make(const Host& host, const Settings& section) {
   made.about.name = name ? name->as_text() : equations ? "equations" : "";
   if (made.about.name.empty())
     throw section.error("a term without a name; expected the key 'name' with that of a term");
-  made.term = {made.about.name, host.make_term(made.about.name, section), {}};
+  // What a plugin finds inconsistent in its options is told with the place where they are written.
+  made.term = {made.about.name,
+               equations ? host.make_term(made.about.name, section) : PluginOption<Term>{""}.make(host, section),
+               {}};
   if (equations) {
     const Settings* const meaning = equations->find("meaning");
     made.about.meaning = meaning ? meaning->as_text() : "";

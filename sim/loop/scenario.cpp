@@ -67,7 +67,7 @@ const OptionTable<PathOptions>& path_table() {
                   "of headland [m]; where it is less than two radii, the vehicle reverses in its turns",
                   greater_than(0.0))
           .optional_number("turn_radius", &P::turn_radius, "of zigzag (none: 9) and headland (none: 5) [m]",
-                           greater_than(0.0))
+                           between(1e-3, 1e6))
           .number("spacing", &P::spacing, "largest distance between waypoints [m]", greater_than(0.0))
           .text("file", &P::file, "of waypoints x, y (, speed, left, right), for path.name: file")
           .number("acceleration", &P::acceleration,
@@ -80,10 +80,12 @@ const OptionTable<PathOptions>& path_table() {
   return rows;
 }
 
+constexpr double farthest_value = BoundsValue::farthest;
+
 /// The values of constant terrain.
 const NumbersByName& values_by_name() {
   static const NumbersByName map(
-      "terrain values", {any()},
+      "terrain values", {between(-farthest_value, farthest_value)},
       {{"PARAMETER",
         &ModelDescription::parameters,
         {"", [](const ModelDescription&, const Variable& parameter, std::size_t) { return parameter.nominal; }},
@@ -105,8 +107,10 @@ const OptionTable<TerrainOptions>& terrain_table() {
           .number("correlation_length", &T::correlation_length, "L of the gaussian field [m]", greater_than(0.0))
           .number("period", &T::period, "after which the gaussian field repeats itself [m]", greater_than(0.0))
           .number("patch_size", &T::patch_size, "of patches [m]", greater_than(0.0))
-          .number("lower", &T::lower, "least value of gaussian and patches, of ratios (1 where nothing slips)")
-          .number("upper", &T::upper, "largest value of gaussian and patches, of ratios")
+          .number("lower", &T::lower, "least value of gaussian and patches, of ratios (1 where nothing slips)",
+                  between(-farthest_value, farthest_value))
+          .number("upper", &T::upper, "largest value of gaussian and patches, of ratios",
+                  between(-farthest_value, farthest_value))
           .optional_integer("seed", &T::seed, "of gaussian and patches; none: the scenario's", between(0, 2147483647))
           .map("ranges", &T::ranges,
                {{"PARAMETER", "[lower, upper]", "", "", "of gaussian and patches, in place of lower and upper"}})
@@ -132,7 +136,7 @@ struct VehicleOptions {
 
 const NumbersByName& vehicle_noise_by_name() {
   static const NumbersByName map(
-      "noise of the vehicle", {at_least(0.0)},
+      "noise of the vehicle", {between(0.0, farthest_value)},
       {{"STATE", &ModelDescription::states, constant_default(0.0),
         "what disturbs it: white noise, by whose integral it strays in a second; per square root of a second. "
         "`noise.states` is what the estimator knows of it"}});
@@ -470,7 +474,9 @@ Scenario::Scenario(const Host& host, const Settings& settings)
   if (!(samples >= 1.0 && samples <= most_samples))
     throw key_or_section(settings, "step")
         .error(
-            fmt::format("a path of {:.4g} m that takes {:.4g} s has {:.4g} steps of {} s; expected between 1 and {:g}",
+            fmt::format("a path of {:.4g} m that takes {:.4g} s has {:.4g} steps of {} s; expected between 1 and {:g}: "
+                        "how long it takes is up to speed, to path.spacing of its waypoints, and to "
+                        "path.acceleration and path.lateral_acceleration",
                         path_.length(), path_.duration(), samples, options_.step, most_samples));
   const double along = path_table().parse(options_.path, "path").start;
   if (!(along < path_.length()))

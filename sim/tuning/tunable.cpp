@@ -60,8 +60,8 @@ Tunable offset_of(const std::string& key, double start, const std::string& unit,
 void add_lever_arms(const Host& host, const Robot& robot, std::vector<Tunable>& all) {
   const PluginChoice model = robot.model_choice();
   for (const OptionRow& row : host.options(PluginKind::model, model.name)) {
-    // A number without a constraint has a sign.
-    if (row.type != "number" || !row.constraint.empty()) continue;
+    const bool has_sign = row.constraint.empty() || row.constraint.starts_with("between -");
+    if (row.type != "number" || !has_sign) continue;
     const Settings* given = model.options.find(row.name);
     const double start = given ? given->as_number() : Settings::scalar(row.default_value).number().value_or(0.0);
     all.push_back(offset_of("model." + row.name, start, "m", Doubts::length));

@@ -16,8 +16,8 @@ const OptionTable<ActuatorOptions>& ActuatorOptions::table() {
       OptionTable<A>()
           .number("lag", &A::lag, "time constant with which the input follows what is asked [s]; 0: none",
                   between(0.0, 1e3))
-          .number("lower", &A::lower, "least input that the actuator gives")
-          .number("upper", &A::upper, "largest input that the actuator gives");
+          .number("lower", &A::lower, "least input that the actuator gives", or_infinite(any()))
+          .number("upper", &A::upper, "largest input that the actuator gives", or_infinite(any()));
   return rows;
 }
 

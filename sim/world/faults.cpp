@@ -124,7 +124,8 @@ const OptionTable<FaultOptions>& FaultOptions::table() {
                  "distance in the space of all that are named")
           .optional_number("size", &F::size,
                            "in the unit of the sensors; of drift a second; of value the value itself (also .inf); of "
-                           "wheel_spin the share that is lost; of late, stamp and clock [s]")
+                           "wheel_spin the share that is lost; of late, stamp and clock [s]",
+                           or_infinite(any()))
           .optional_integer("seed", &F::seed, "of directions, sizes and times that are drawn; none: the scenario's",
                             between(0, 2147483647));
   return rows;

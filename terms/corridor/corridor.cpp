@@ -21,16 +21,19 @@ struct CorridorOptions : LimitOptions {
     using C = CorridorOptions;
     static const auto options = with_limit_options(
         OptionTable<C>()
-            .number("left", &C::left, "distance of the left edge from the path, where its waypoints do not say it [m]")
+            .number("left", &C::left, "distance of the left edge from the path, where its waypoints do not say it [m]",
+                    or_infinite(any()))
             .number("right", &C::right,
-                    "distance of the right edge from the path, where its waypoints do not say it [m]")
+                    "distance of the right edge from the path, where its waypoints do not say it [m]",
+                    or_infinite(any()))
             .number("margin", &C::margin, "how far the point that follows the path stays from either edge [m]",
                     at_least(0.0))
             .numbers("along", &C::along,
                      "distances along the path [m], increasing, at which left_along and right_along are given; between "
                      "them edges are straight, beyond them as at the nearest")
-            .numbers("left_along", &C::left_along, "instead of left, one for each of along [m]")
-            .numbers("right_along", &C::right_along, "instead of right, one for each of along [m]"));
+            .numbers("left_along", &C::left_along, "instead of left, one for each of along [m]", or_infinite(any()))
+            .numbers("right_along", &C::right_along, "instead of right, one for each of along [m]",
+                     or_infinite(any())));
     return options;
   }
 };

@@ -7,11 +7,12 @@ import csv
 import json
 import math
 import pathlib
+import re
 import sys
 import tempfile
 
 import cli
-from cli import FIGURE8, FINE, SHORT, ZIGZAG, Program, assignments
+from cli import FIGURE8, FINE, NOT_SOLVED, SHORT, ZIGZAG, Program, assignments
 
 EXACT = {"steps", "completed", "mae", "rmse", "nees", "nees_expected", "within_two_sigma", "certainty", "solve_time_us", "statuses",
          "fallbacks", "integration"}
@@ -219,6 +220,38 @@ class Test(cli.Findings):
         self.expect(result.returncode == FINE and "the integration was too coarse" in result.stdout, "substeps 8",
                     result.stdout + result.stderr)
 
+    def coarse_motion(self):
+        """Steps that are too coarse for what a sensor of motion sees, a state of the estimator alone: it is named."""
+        self.count_of_runs += 1
+        result = self.rhec("run", cli.ROOT / "scenarios" / "tractor_trailer.yaml", "--out", self.work / "trailer",
+                           *assignments("path.radius=8", "model.outputs=all", "model.trailer_length=0.5", "speed=6", "estimator.substeps=1",
+                                        "controller.substeps=2"), cwd=self.work)
+        self.expect(result.returncode == FINE and "too coarse, most in 'trailer_yaw_rate': give" in result.stdout, "coarse motion",
+                    f"exit code {result.returncode}: {result.stdout}{result.stderr}")
+
+    def rejected_sensor(self):
+        """Of a sensor of which nothing is used there is no statistic."""
+        self.count_of_runs += 1
+        log = self.work / "all.csv"
+        self.rhec("run", FIGURE8, "--out", self.work / "logged", "--log", log, *assignments(*SHORT), cwd=self.work)
+        result = self.rhec("estimate", FIGURE8, log, "--out", self.work / "rejected",
+                           *assignments("signals.outputs.delta={from: delta, offset: 100000}"), cwd=self.work)
+        line = next((line for line in result.stdout.splitlines() if line.startswith("delta ") and " rad, " in line), "")
+        self.expect(re.match(r"delta +0 +\d+ +- +1\.00 +- / - rad, -$", line), "a sensor that is rejected", result.stdout + result.stderr)
+
+    def numbers_that_end(self):
+        """A vehicle whose motion overflows behind x = 3 m: the run ends there, and all that is written is finite."""
+        self.count_of_runs += 1
+        text = (cli.ROOT / "examples" / "vehicles" / "bicycle.yaml").read_text()
+        vehicle = self.work / "overflows.yaml"
+        vehicle.write_text(text.replace("x_pos' = speed * cos(beta)", "x_pos' = speed * cos(beta) + exp(300 * (x_pos - 3))"))
+        out = self.work / "overflows"
+        result = self.rhec("run", FIGURE8, "--out", out, *assignments(*SHORT, f"model={{equations: {vehicle}}}", "estimator.name=truth"), cwd=self.work)
+        self.expect(result.returncode == NOT_SOLVED and "moves faster than numbers can say" in result.stdout, "overflow", result.stdout + result.stderr)
+        for name in ("steps.csv", "summary.json"):
+            words = (out / name).read_text().replace(",", " ").split()
+            self.expect(not {"nan", "-nan", "inf", "-inf"} & set(words), "overflow", f"{name} has numbers that are not finite")
+
     def limits(self):
         """A soft limit that costs too little to be kept."""
         self.count_of_runs += 1
@@ -253,7 +286,7 @@ class Test(cli.Findings):
 def main():
     with tempfile.TemporaryDirectory(prefix="rhec-cli-") as work:
         test = Test(Program(sys.argv[1]), pathlib.Path(work).resolve())
-        for part in (test.choices, test.repeats, test.overrides, test.fast_lag, test.limits, test.others):
+        for part in (test.choices, test.repeats, test.overrides, test.fast_lag, test.coarse_motion, test.rejected_sensor, test.numbers_that_end, test.limits, test.others):
             part()
         test.tell()
 

@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <limits>
+
 #include "support/error_of.hpp"
 
 namespace rhec {
@@ -132,6 +134,25 @@ TEST(Options, AWrongValueNamesPlaceKeyFindingAndExpectation) {
   EXPECT_THAT(message("sigma", "-1"), HasSubstr("expected a number, greater than 0"));
   EXPECT_THAT(message("weights", "1"), HasSubstr("found '1', expected a list of numbers, each at least 0"));
   EXPECT_THAT(message("label.a", "1"), HasSubstr("label: found a map, expected a text"));
+}
+
+TEST(Options, ANumberIsFiniteAndHasASquare) {
+  const OptionContext context{"a test", "a length [m]"};
+  const auto said = [&](const NumberValue& value, const char* text) {
+    return error_of([&] { value.read(Settings::scalar(text), context); });
+  };
+  const NumberValue length{greater_than(0.0)}, place{any()}, deadline{or_infinite(greater_than(0.0))};
+  EXPECT_THAT(said(length, ".inf"),
+              HasSubstr("found '.inf', expected a finite number, greater than 0 (a test: a length"));
+  EXPECT_THAT(said(place, "-.inf"), HasSubstr("expected a finite number"));
+  for (const char* text : {"5e-324", "1e-300", "1e300"})
+    EXPECT_THAT(said(length, text),
+                HasSubstr("expected a number of a magnitude between 1e-100 and 1e+100, greater than 0"));
+  EXPECT_THAT(said(place, "-1e300"), HasSubstr("expected a number, 0 or of a magnitude between 1e-100 and 1e+100"));
+  EXPECT_EQ(place.read(Settings::scalar("0"), context), 0.0);
+  EXPECT_EQ(length.read(Settings::scalar("1e-100"), context), 1e-100);
+  EXPECT_EQ(deadline.read(Settings::scalar(".inf"), context), std::numeric_limits<double>::infinity());
+  EXPECT_THAT(said(deadline, "-.inf"), HasSubstr("expected a number, greater than 0"));
 }
 
 TEST(Options, AnEmptyValueIsNoValue) {

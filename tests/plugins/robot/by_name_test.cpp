@@ -56,7 +56,7 @@ TEST(NumbersByName, RefusesNumbersOutOfRangeWithTheUnit) {
 
 TEST(NumbersByName, MayBeInfiniteWhereTheValueSaysSo) {
   const ByName<NumberValue> map(
-      "m", {greater_than(0.0)},
+      "m", {or_infinite(greater_than(0.0))},
       {{"PARAMETER", &ModelDescription::parameters, constant_default(3.0), "of a parameter"}});
   EXPECT_THAT(map.read(settings("kappa: .inf"), about()), ElementsAre(std::numeric_limits<double>::infinity()));
 }
@@ -82,6 +82,29 @@ TEST(BoundsValue, ReadsPairsOfWhichNullIsNone) {
         << wrong;
   EXPECT_THAT(error_of([] { BoundsValue{}.read(settings("[2, 1]"), {}); }),
               HasSubstr("found [2, 1], expected lower <= upper"));
+}
+
+TEST(BoundsValue, RefusesWhatNoVehicleReaches) {
+  for (const char* wrong : {"[.inf, null]", "[null, -.inf]", "[1e300, null]", "[null, 1e12]", "[5e-324, 1]"})
+    EXPECT_THAT(error_of([&] { BoundsValue{}.read(settings(wrong), {}); }),
+                HasSubstr("expected bounds of a magnitude of at most 1e+09, or null for none"))
+        << wrong;
+  EXPECT_THAT(BoundsValue{}.read(settings("[-.inf, .inf]"), {}), Pair(-infinity, infinity));
+  EXPECT_THAT(BoundsValue{}.read(settings("[0, 1e9]"), {}), Pair(0.0, 1e9));
+}
+
+TEST(SigmaValue, LiesWhereDoublesTellItFromNothingAndFromEverything) {
+  const SigmaValue sigma{greater_than(0.0)}, drift{at_least(0.0)};
+  EXPECT_EQ(sigma.read(settings("1e-9"), {}), 1e-9);
+  EXPECT_EQ(drift.read(settings("0"), {}), 0.0);
+  for (const char* wrong : {"1e-12", "5e-324", "1e12"}) {
+    EXPECT_THAT(error_of([&] { sigma.read(settings(wrong), {}); }),
+                HasSubstr("expected a standard deviation between 1e-09 and 1e+09, in the variable's unit;"))
+        << wrong;
+    EXPECT_THAT(error_of([&] { drift.read(settings(wrong), {}); }), HasSubstr(", or 0;")) << wrong;
+  }
+  EXPECT_THAT(error_of([&] { sigma.read(settings("0"), {}); }), HasSubstr("greater than 0"));
+  EXPECT_THAT(error_of([&] { sigma.read(settings(".inf"), {}); }), HasSubstr("a finite number"));
 }
 
 }  // namespace by_name_test

@@ -126,7 +126,7 @@ TEST(EstimatorSection, RefusesWrongNumbersWhateverTheEstimator) {
       {"restart_sigma: {kappa: .inf}", "a finite number"},
       {"block_sigma: {kappa: 0}", "greater than 0"},
       {"initial: {sigma: {beta: 0}}", "greater than 0"},
-      {"initial: {state: {beta: .inf}}", "a finite number"},
+      {"initial: {state: {beta: .inf}}", "between -1000000000 and 1000000000"},
   };
   for (const auto& [text, expected] : wrong)
     EXPECT_THAT(error_of([text = text] { estimator(std::string("name: ekf\n") + text); }),

@@ -27,7 +27,7 @@ TEST(ModelSection, ErrorsNameThePlace) {
   EXPECT_THAT(error_of([] { ModelSection(host(), settings("name: bicycle_slip\nwheelbse: 1")); }),
               AllOf(StartsWith("robot.yaml:2: wheelbse"), HasSubstr("did you mean 'wheelbase'?")));
   EXPECT_THAT(error_of([] { ModelSection(host(), settings("name: bicycle_slip\nwheelbase: 0")); }),
-              AllOf(StartsWith("robot.yaml:2: wheelbase"), HasSubstr("greater than 0")));
+              AllOf(StartsWith("robot.yaml:2: wheelbase"), HasSubstr("between 0.001 and 1000")));
 }
 
 }  // namespace model_section_test

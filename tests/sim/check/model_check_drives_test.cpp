@@ -1,11 +1,15 @@
 // What is found out on drives: parameters that nothing sees, and scales that are far off.
 #include <gmock/gmock.h>
 
+#include <string>
+#include <vector>
+
 #include "sim/support/unicycle.hpp"
 
 namespace rhec::sim {
 namespace model_check_drives_test {
 
+using testing::AllOf;
 using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -47,6 +51,28 @@ TEST(ModelCheck, NamesErrorsOfSensorsThatTheDataCannotSeparate) {
   EXPECT_THAT(faults(both),
               testing::IsSupersetOf({"warn observability: x_gps_scale", "warn observability: y_gps_scale"}));
   options.scaled = {2};
+  EXPECT_THROW(check({}, options), Error);
+}
+
+/// "pass: ...", "warn x_gps_bias: ...": what is found of observability.
+std::vector<std::string> of_observability(const ModelCheck& check) {
+  std::vector<std::string> found;
+  for (const Finding& finding : check.findings)
+    if (finding.check == "observability") found.push_back(finding.where + ": " + finding.found);
+  return found;
+}
+
+TEST(ModelCheck, ComparesErrorsOfSensorsWithWhatIsKnownOfThem) {
+  ModelCheckOptions options;
+  options.scaled = {0};
+  options.scale_sigmas = {10.0};
+  EXPECT_THAT(of_observability(check({}, options)), Contains(HasSubstr("x_gps_scale to ")));
+  options.scale_sigmas = {1e-6};
+  const ModelCheck known = check({}, options);
+  EXPECT_THAT(faults(known), ElementsAre("warn observability: x_gps_scale"));
+  EXPECT_THAT(of_observability(known),
+              Contains(AllOf(HasSubstr("more than the 1e-06 that is known before"), HasSubstr("hardly separate"))));
+  options.scale_sigmas = {1.0, 1.0};
   EXPECT_THROW(check({}, options), Error);
 }
 

@@ -24,11 +24,14 @@ struct OptionRow {
   std::string meaning;        ///< short description, with the unit
 };
 
-/// The allowed values of a number.
+/// The allowed values of a number. Beside what a range says, a number is 0 or has a magnitude from `least_magnitude` to
+/// `most_magnitude`, so that its square and that of its inverse are numbers, with room for what multiplies them.
 struct RHEC_EXPORT Range {
+  static constexpr double least_magnitude = 1e-100, most_magnitude = 1e100;
   double lower = -std::numeric_limits<double>::infinity();
   double upper = std::numeric_limits<double>::infinity();
-  bool lower_is_open = false;  ///< `lower` itself is not allowed
+  bool lower_is_open = false;    ///< `lower` itself is not allowed
+  bool may_be_infinite = false;  ///< .inf and -.inf mean something
 
   bool contains(double value) const noexcept {
     return (lower_is_open ? value > lower : value >= lower) && value <= upper;
@@ -39,6 +42,11 @@ constexpr Range any() { return {}; }
 constexpr Range at_least(double lower) { return {.lower = lower}; }
 constexpr Range greater_than(double lower) { return {.lower = lower, .lower_is_open = true}; }
 constexpr Range between(double lower, double upper) { return {.lower = lower, .upper = upper}; }
+/// The same range, with infinity where nothing bounds it: "no limit".
+constexpr Range or_infinite(Range range) {
+  range.may_be_infinite = true;
+  return range;
+}
 
 /// The candidate that `word` was most likely meant to be (fewest letters inserted, dropped, changed or swapped); empty
 /// if none is close.

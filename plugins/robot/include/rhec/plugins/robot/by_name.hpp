@@ -11,17 +11,10 @@
 
 namespace rhec {
 
-/// A number that must be finite, whatever its range.
-struct RHEC_EXPORT FiniteValue {
-  Range range;
-  double read(const Settings& from, const OptionContext& context) const;
-  std::string type() const { return NumberValue{range}.type(); }
-  std::string constraint() const { return NumberValue{range}.constraint(); }
-};
-
-/// A standard deviation: its square and that of its inverse are numbers, with room for what multiplies them; or 0, if
-/// the range has it.
+/// A standard deviation, or 0, if the range has it. Between the least and the largest of them lies what doubles tell
+/// apart: problems whose weights differ by more are solved to no digit.
 struct RHEC_EXPORT SigmaValue {
+  static constexpr double least = 1e-9, most = 1e9;
   Range range;
   double read(const Settings& from, const OptionContext& context) const;
   std::string type() const { return NumberValue{range}.type(); }
@@ -30,6 +23,7 @@ struct RHEC_EXPORT SigmaValue {
 
 /// [lower, upper] as written in a configuration; null stands for no bound.
 struct RHEC_EXPORT BoundsValue {
+  static constexpr double farthest = 1e9;  ///< what is farther off is no bound of a vehicle's
   std::pair<double, double> read(const Settings& from, const OptionContext& context) const;
   std::string type() const { return "list of 2 numbers"; }
   std::string constraint() const { return "lower <= upper; null for none"; }
@@ -104,7 +98,7 @@ class ByName {
   std::vector<Kind> kinds_;
 };
 
-using NumbersByName = ByName<FiniteValue>;
+using NumbersByName = ByName<NumberValue>;
 using SigmasByName = ByName<SigmaValue>;
 
 }  // namespace rhec

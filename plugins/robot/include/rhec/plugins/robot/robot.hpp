@@ -30,7 +30,7 @@ struct RobotOptions {
   static OptionTable<Derived>& add_to(OptionTable<Derived>& rows) {
     return rows
         .number("step", &Derived::step, "interval of the estimator's nodes, and of the controller [s]",
-                greater_than(0.0))
+                between(1e-5, 1e5))
         .subtree("model", &Derived::model, "the vehicle: name and options of a model plugin")
         .subtree("noise", &Derived::noise, "standard deviations: outputs and inputs, by the variable's name")
         .subtree("bounds", &Derived::bounds,

@@ -66,6 +66,8 @@ struct ModelCheckOptions {
   std::vector<double> output_sigmas = {}, input_sigmas = {};
   /// Which outputs have a bias or a scale error that is estimated: judged are these, and the parameters beside them.
   std::vector<int> biased = {}, scaled = {};
+  /// What is known of these errors without measurements, as standard deviations; empty: nothing.
+  std::vector<double> bias_sigmas = {}, scale_sigmas = {};
   std::vector<std::shared_ptr<const Blocking>> blockings = {};  ///< by parameter; empty: one value over the horizon
   static constexpr int longest_horizon = 100;
 };
