@@ -49,8 +49,9 @@ void SensorMessages::write(bool is_output, logs::Stamp when, const double* value
   places_.clear();
   for (std::size_t i = 0; i < signals_.size(); ++i) {
     const logs::MappedSignal& signal = signals_[i];
+    if (signal.is_output != is_output) continue;
     const double value = values[signal.index];
-    if (signal.is_output != is_output || std::isnan(value)) continue;
+    if (std::isnan(value)) continue;
     const std::pair key{topic_of_[i], signal.options.delay};
     const double read = (value - signal.options.offset) / signal.factor;
     if (is_geodetic(signal.options.form))
