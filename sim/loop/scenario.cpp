@@ -179,8 +179,8 @@ constexpr double most_waypoints = 2e6, most_samples = 1e6;
 void require_few_waypoints(const Settings& section, double length, double spacing) {
   if (length / spacing <= most_waypoints) return;
   throw key_or_section(section, "spacing")
-      .error(fmt::format("a path of {:.4g} m has a waypoint every {} m, more than {:g} of them; make it shorter or the "
-                         "spacing larger",
+      .error(fmt::format("a path of {:.4g} m has a waypoint every {} m, more than {:g} of them; expected a larger "
+                         "spacing, or a shorter path",
                          length, spacing, most_waypoints));
 }
 
