@@ -4,6 +4,8 @@
 #include <tuple>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "rhec/plugins/robot/by_name.hpp"
 
 namespace rhec {
@@ -34,12 +36,17 @@ BoundsSection::BoundsSection(const Settings& section, const ModelDescription& ab
   auto next = bounds.begin();
   for (const Bounded kind : bounded_kinds)
     for (Variable& variable : bounded_.*kind) std::tie(variable.lower, variable.upper) = *next++;
+  // No motion meets that, and no estimate agrees with what is measured.
+  for (const Variable& state : bounded_.states)
+    if (const Settings* const given = section.find(state.name); given && state.lower == state.upper)
+      throw given->error(
+          fmt::format("found [{0:g}, {0:g}], expected lower < upper: a state of the vehicle moves", state.lower));
 }
 
 OptionSection BoundsSection::documentation() {
   return {"bounds",
           "Lower and upper bounds. Those of states hold for estimator and controller, those of parameters for the "
-          "estimator, those of inputs for the controller.",
+          "estimator, those of inputs for the controller. Those of a state differ.",
           bounds_by_name().rows()};
 }
 

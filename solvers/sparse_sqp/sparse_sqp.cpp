@@ -432,7 +432,7 @@ Status SparseSqp::converge(const Ocp& ocp, const Iterate& guess, Report& report,
       return Status::solved;
     }
     if (report.iterations == options_.max_iterations) return Status::iteration_limit;
-    if (report.iterations == std::max(1, static_cast<int>(patience * options_.max_iterations)) &&
+    if (report.iterations >= std::max(1, static_cast<int>(patience * options_.max_iterations)) &&
         find_tracking_start(ocp, guess, deadline))
       return Status::iteration_limit;
     if (Clock::now() > deadline) return Status::deadline;

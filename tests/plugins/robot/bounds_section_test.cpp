@@ -44,6 +44,15 @@ TEST(BoundsSection, RefusesUnknownNamesAndWrongPairs) {
               StartsWith("robot.yaml:1: kappa: found [1, 0], expected lower <= upper"));
 }
 
+TEST(BoundsSection, HoldNoStateAtAPoint) {
+  EXPECT_THAT(error_of([] { BoundsSection(settings("u1: [0, 4]\ny_pos: [2, 2]"), own()); }),
+              StartsWith("robot.yaml:2: y_pos: found [2, 2], expected lower < upper"));
+  // Slip that is known, and an input that is.
+  const ModelDescription bounded = BoundsSection(settings("{kappa: [1, 1], u1: [3, 3]}"), own()).bounded();
+  EXPECT_EQ(bounded.parameters[0].lower, bounded.parameters[0].upper);
+  EXPECT_EQ(bounded.inputs[0].lower, bounded.inputs[0].upper);
+}
+
 TEST(BoundsSection, DocumentsOneRowForAllKinds) {
   const OptionSection section = BoundsSection::documentation();
   ASSERT_EQ(section.rows.size(), 1U);

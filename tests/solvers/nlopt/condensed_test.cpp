@@ -71,19 +71,24 @@ TEST(CondensedProblem, HasTheDerivativesThatDifferencesSay) {
   check_derivatives(*rhc, RandomProblem::cold_start(*rhc));
 }
 
+/// A hard one, a soft one that is met, and one of the controls that is violated by far, so that differences see one
+/// branch: its violation is a part of the objective.
+void add_limits(LimitedOcp& limited, int intervals) {
+  const int u = limited.capacity().states;
+  for (int i = 0; i <= intervals; ++i) {
+    limited.add(i, {Limit::Kind::distance, {0, 1}, {0.3 * i, -0.4}, 0.5});
+    limited.add(i, {Limit::Kind::linear, {1, 0}, {1.0, -0.3}, -2.0, 1.0, 10.0, 3.0});
+    if (i < intervals) limited.add(i, {Limit::Kind::product, {u, 2}, {0.7}, 5.0, infinity, 0.0, 4.0});
+  }
+}
+
 TEST(CondensedProblem, LimitsAndTheirSlacksHaveTheDerivativesThatDifferencesSay) {
   RandomProblem random(bicycle(), 37);
   RandomProblem::RhcSpec spec;
   spec.intervals = 5;
   const auto rhc = random.rhc(spec);
-  const int u = rhc->capacity().states;
   LimitedOcp limited(*rhc, 3);
-  for (int i = 0; i <= 5; ++i) {
-    limited.add(i, {Limit::Kind::distance, {0, 1}, {0.3 * i, -0.4}, 0.5});
-    limited.add(i, {Limit::Kind::linear, {1, 0}, {1.0, -0.3}, -2.0, 1.0, 10.0, 3.0});
-    // Violated by far, so that differences see one branch: its violation is a part of the objective.
-    if (i < 5) limited.add(i, {Limit::Kind::product, {u, 2}, {0.7}, 5.0, infinity, 0.0, 4.0});
-  }
+  add_limits(limited, 5);
   const Iterate start = with_limits(limited, RandomProblem::cold_start(*rhc));
   check_derivatives(limited, start);
   CondensedProblem problem(limited);
@@ -115,13 +120,8 @@ TEST(CondensedProblem, WithAFeedbackHasTheDerivativesThatDifferencesSay) {
     rhc->input_lower(2, 0) = rhc->input_upper(2, 0) = 0.7;
     std::vector<double> scratch(rhc->scratch_size());
     rhc->finish(scratch);
-    const int u = rhc->capacity().states;
     LimitedOcp limited(*rhc, 3);
-    for (int i = 0; i <= 5; ++i) {
-      limited.add(i, {Limit::Kind::distance, {0, 1}, {0.3 * i, -0.4}, 0.5});
-      limited.add(i, {Limit::Kind::linear, {1, 0}, {1.0, -0.3}, -2.0, 1.0, 10.0, 3.0});
-      if (i < 5) limited.add(i, {Limit::Kind::product, {u, 2}, {0.7}, 5.0, infinity, 0.0, 4.0});
-    }
+    add_limits(limited, 5);
     Iterate start = with_limits(limited, RandomProblem::cold_start(*rhc));
     scratch.resize(limited.scratch_size());
     roll_out(limited, start, scratch);
