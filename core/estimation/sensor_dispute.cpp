@@ -144,7 +144,7 @@ double SensorWatch::likelihood(WalkingFilter& filter, bool with_rejected) noexce
 /// has left in steps, and was wrong from the first on. The filter then goes on as if it had said nothing.
 bool SensorWatch::retract_slip() noexcept {
   Memory& memory = *memory_;
-  const bool is_slip = slip_->is_active && memory.is_slip_possible;
+  const bool is_slip = slip_->is_active && memory.slip_beyond < Memory::impossible_slip;
   if (disputed_samples_ != 1 || is_slip || memory.since_release > soon || !is_position_disputed()) return false;
   int ago = 0;
   while (ago < memory.connected && memory.entry(ago).time > memory.released.outputs_from) ++ago;
@@ -241,7 +241,7 @@ bool SensorWatch::consider_slip_before() noexcept {
     memory_->replay(back, filter, [&](const Memory::Entry& entry) {
       copy_numbers(filter.mean(), memory_->before_slip);
       filter.update(entry.outputs.measured());
-      beyond = std::max(beyond, Memory::slip_beyond(filter, memory_->before_slip, setup_.noise));
+      beyond = std::max(beyond, Memory::slip_beyond_bounds(filter, memory_->before_slip, setup_.noise));
     });
     filter.predict(input_.data(), memory_->duration);
     if (beyond > unlikely_slip || !fits(filter, raw_.data())) continue;
@@ -254,7 +254,11 @@ bool SensorWatch::consider_slip_before() noexcept {
 /// The log likelihood of slip that has jumped just now; NaN if it has not.
 double SensorWatch::consider_slip() noexcept {
   const bool is_new = !slip_->is_active;
-  const auto slip_beyond = [&] { return Memory::slip_beyond(slip_->filter, memory_->before_slip, setup_.noise); };
+  double& beyond = memory_->slip_beyond;
+  if (is_new) beyond = 0.0;
+  const auto note_beyond = [&] {
+    beyond = std::max(beyond, Memory::slip_beyond_bounds(slip_->filter, memory_->before_slip, setup_.noise));
+  };
   double new_likelihood = Memory::unknown;
   if (is_new) {
     start(*slip_);
@@ -272,7 +276,7 @@ double SensorWatch::consider_slip() noexcept {
     go_on_from(edge_->filter, slip_->filter);
     copy_numbers(slip_->filter.mean(), memory_->before_slip);
     slip_->filter.update(weighed(raw_.data()));
-    memory_->is_slip_possible = slip_beyond() < Memory::impossible_slip;
+    note_beyond();
     memory_->jumps[1] = memory_->entry(0).time;
     memory_->jump_count = 2;
     edge_->is_active = false;
@@ -280,7 +284,7 @@ double SensorWatch::consider_slip() noexcept {
   }
   copy_numbers(slip_->filter.mean(), memory_->before_slip);
   confront(*slip_, raw_.data(), true);
-  memory_->is_slip_possible = slip_->is_active && slip_beyond() < Memory::impossible_slip;
+  if (slip_->is_active) note_beyond();
   begin_edge(is_new);
   return new_likelihood;
 }
@@ -397,14 +401,15 @@ bool SensorWatch::is_within_bounds(const Eigen::VectorXd& mean) const noexcept {
 /// has the covariance of both answers, so that it agrees with what the sensors say: nothing is wrong with it.
 bool SensorWatch::is_probably_slip() const noexcept {
   return is_disputed_ && disputed_samples_ <= fresh && slip_->is_active && slip_probability_ > probable &&
-         memory_->was_calm && memory_->is_slip_possible && is_within_bounds(own_->filter.mean()) &&
+         memory_->was_calm && memory_->slip_beyond < Memory::impossible_slip && is_within_bounds(own_->filter.mean()) &&
          (input_findings_ | inputs_.reasons) == 0;
 }
 
 /// What was held back, and what was rejected last, is right after all.
 void SensorWatch::acquit(const double* outputs) noexcept {
-  // Slip at a bound may well be beyond it, as that of wheels that spin on the spot.
-  const bool is_doubtful = !memory_->was_calm || !is_within_bounds(own_->filter.mean());
+  // Slip at a bound that measurements ask to be beyond it may well be there, as that of wheels that spin on the spot.
+  const bool is_beyond = memory_->slip_beyond > unlikely_slip && !is_within_bounds(own_->filter.mean());
+  const bool is_doubtful = !memory_->was_calm || is_beyond;
   const auto take_back = [&](auto&& was_rejected) {
     for (std::size_t s = 0; s < sensors_.size(); ++s) {
       if (std::ranges::none_of(sensors_[s].outputs, was_rejected)) continue;

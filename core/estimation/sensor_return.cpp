@@ -137,7 +137,7 @@ bool SensorWatch::changes_slip(Hypothesis& each) noexcept {
   if (!fits(trial, raw_.data())) return false;
   copy_numbers(trial.mean(), memory_->before_slip);
   trial.update_as_expected(weighed(raw_.data()));
-  if (Memory::slip_beyond(trial, memory_->before_slip, setup_.noise) >= Memory::impossible_slip) return false;
+  if (Memory::slip_beyond_bounds(trial, memory_->before_slip, setup_.noise) >= Memory::impossible_slip) return false;
   each.filter.mean() = trial.mean();
   each.filter.covariance() = trial.covariance();
   each.new_slips = goes_on ? 2 : 1;

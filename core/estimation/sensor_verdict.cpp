@@ -11,8 +11,8 @@ namespace rhec {
 
 namespace {
 
-// While a measurement is missing, and for so many estimates afterwards, an ellipsoid of more than so many times
-// its usual volume is a finding; the usual one is a mean over so many estimates before.
+// An ellipsoid of more than so many times the volume that it would have if nothing was lacking is a finding, until so
+// many samples after the last one of which something was; the usual volume is a mean over so many estimates before.
 constexpr int aftermath = 10;
 constexpr double most_volume = 2.0, volume_memory = 10.0;
 
@@ -93,13 +93,10 @@ void SensorWatch::widen(Estimate& estimate) noexcept {
   estimate.parameters += share * away.tail(n - nx);
 }
 
-/// What volume is usual is learnt where nothing is missing.
+/// What volume is usual is learnt where nothing is lacking.
 void SensorWatch::note_volume(const Estimate& estimate) noexcept {
-  if (aftermath_ > 0) {
-    --aftermath_;
-    return;
-  }
-  const double volume = memory_->log_volume(estimate.covariance);
+  if (memory_->loss->is_active()) return;
+  const double volume = log_volume(estimate.covariance, memory_->factor);
   if (std::isnan(usual_volume_))
     usual_volume_ = volume;
   else if (!std::isnan(volume))
@@ -118,7 +115,6 @@ void SensorWatch::assess(const Estimate& estimate, std::span<const Presence> pre
     is_overdue = is_overdue || presence[s] != Presence::present;
     has_finding = has_finding || health.sensors[s].reasons != 0;
   }
-  if (is_overdue) aftermath_ = aftermath;
   const Roles& roles = own_->filter.model().description().roles;
   const Eigen::MatrixXd& P = estimate.covariance;
   if (is_searching()) health.reasons |= reason::uncertain;
@@ -134,8 +130,11 @@ void SensorWatch::assess(const Estimate& estimate, std::span<const Presence> pre
       health.reasons |= reason::uncertain;
       is_lost = true;
     }
-    if (aftermath_ > 0 && P.rows() == own_->filter.mean().size() &&
-        memory_->log_volume(P) > usual_volume_ + std::log(most_volume)) {
+    const InformationLoss& loss = *memory_->loss;
+    const bool has_lost = loss.excess() > std::log(most_volume) && loss.samples_since() <= aftermath;
+    if ((has_lost && !memory_->was_open) ||
+        (is_overdue && P.rows() == own_->filter.mean().size() &&
+         log_volume(P, memory_->factor) > usual_volume_ + std::log(most_volume))) {
       health.reasons |= reason::uncertain;
       has_finding = true;
     }

@@ -115,6 +115,7 @@ SensorWatch::SensorWatch(std::shared_ptr<const Model> model, const Setup& setup)
   memory_ = std::make_unique<Memory>();
   memory_->stuck = StuckValues(setup_.noise.output_variances);
   memory_->trial = std::make_unique<WalkingFilter>(model, filter_setup(setup_));
+  memory_->loss = std::make_unique<InformationLoss>(model, filter_setup(setup_));
   own_->filter.expect();
   std::vector<OffsetWatch::Watched> watched;
   if (setup_.offsets) watched = watched_outputs(own_->filter, setup_.noise.output_variances);
@@ -162,7 +163,7 @@ void SensorWatch::reset() noexcept {
   heard_.assign(sensors_.size(), Memory::unknown);
   is_unobserved_ = false;
   usual_volume_ = Memory::unknown;
-  aftermath_ = 0;
+  memory_->loss->reset();
   if (memory_->search) memory_->search->cancel();
   inputs_ = {};
   input_findings_ = 0;
@@ -190,6 +191,7 @@ void SensorWatch::restart(const Eigen::VectorXd& mean, const Eigen::MatrixXd& co
   memory_->places.clear();
   memory_->count = memory_->connected = 0;
   memory_->has_advanced = false;
+  memory_->loss->end();
   memory_->offsets->forget_onsets();
 }
 
@@ -209,6 +211,7 @@ void SensorWatch::clean_inputs(double* inputs) noexcept {
 
 void SensorWatch::advance(double duration, const double* inputs, const double* more_sigmas) noexcept {
   if (!is_active_) return;
+  if (!is_searching()) memory_->loss->predict(own_->filter, inputs, duration, more_sigmas);
   if (more_sigmas) {
     // Nobody knows how the vehicle has moved: what follows starts from here.
     if (!is_unobserved_) {
@@ -334,11 +337,12 @@ SensorWatch::Finding SensorWatch::judge(double time, double* outputs, const doub
       for (std::size_t j = 0; j < input_.size() && !is_blind_; ++j)
         if (!std::isnan(input_[j])) believed_input_[j] = input_[j];
     }
+    memory_->loss->update(filter, time, raw_.data(), weighed(outputs));
     if (!finding.rebase && !finding.release) {
       copy_numbers(filter.mean(), memory_->before_update);
       filter.update_as_expected(weighed(outputs));
       double& beyond = memory_->beyond_bounds;
-      beyond += Memory::slip_beyond(filter, memory_->before_update, setup_.noise) - usually_beyond;
+      beyond += Memory::slip_beyond_bounds(filter, memory_->before_update, setup_.noise) - usually_beyond;
       beyond = std::min(std::max(beyond, 0.0), 2.0 * impossibly_beyond);
       if (beyond > impossibly_beyond) {
         input_findings_ |= reason::implausible;
@@ -379,6 +383,9 @@ SensorWatch::Finding SensorWatch::judge(double time, double* outputs, const doub
     if (is_blind_ || is_unobserved_) finding = {.rebase = true};
     is_unobserved_ = false;
     if (finding.rebase) start_search(outputs);
+    if (finding.rebase) memory_->loss->follow(filter);
+    // On new ground slip would not be known, either.
+    if (finding.release) memory_->loss->end();
     if (finding.rebase) memory_->connected = 0;
     if (finding.release) std::copy(raw_.begin(), raw_.end(), outputs);
     note_corrected(finding.rebase || finding.release);

@@ -12,6 +12,8 @@
 #include <Eigen/Core>
 
 #include "heading_search.hpp"
+#include "information_loss.hpp"
+#include "log_volume.hpp"
 #include "numbers.hpp"
 #include "offset_watch.hpp"
 #include "past_places.hpp"
@@ -134,9 +136,10 @@ struct SensorWatch::Memory {
   Retraction released{unknown, unknown, nullptr};       ///< what would have to be taken back of that
   std::vector<double> retracted;                        ///< n_y, not missing of outputs that were wrong then
   MeasuredOutputs replayed;                             ///< what counts of a sample that is replayed
-  bool is_slip_possible = false;                        ///< slip that explains what is disputed is within its bounds
+  double slip_beyond = 0.0;  ///< how far slip that explains what is disputed is beyond its bounds, in its standard deviations
   StuckValues stuck;
   std::unique_ptr<OffsetWatch> offsets;
+  std::unique_ptr<InformationLoss> loss;
   std::unique_ptr<WalkingFilter> trial;   ///< for what is tried within one call
   std::unique_ptr<HeadingSearch> search;  ///< null for a vehicle without a heading
   /// The same, of a heading that may be wrong, while it is not known who is.
@@ -157,7 +160,7 @@ struct SensorWatch::Memory {
   bool was_return = false;  ///< what was followed last
 
   /// After an update of a filter from a mean: how far slip would be beyond its bounds, in its standard deviations.
-  static double slip_beyond(const WalkingFilter& filter, const Eigen::VectorXd& before,
+  static double slip_beyond_bounds(const WalkingFilter& filter, const Eigen::VectorXd& before,
                             const KalmanFilter::Noise& noise) noexcept {
     double most = 0.0;
     const Eigen::Index nx = filter.model().state_count();
@@ -172,27 +175,6 @@ struct SensorWatch::Memory {
       most = std::max(most, std::max(lower - slip, slip - upper) / std::sqrt(variance));
     }
     return most;
-  }
-
-  /// log sqrt(det P); NaN where P is not positive definite, as of a parameter that is known.
-  double log_volume(const Eigen::MatrixXd& covariance) noexcept {
-    copy_numbers(covariance, factor);
-    return with_size(static_cast<int>(factor.rows()), [&](auto n) {
-      double* L = factor.data();
-      double sum = 0.0, product = 1.0;
-      for (int k = 0; k < n; ++k) {
-        const double pivot = L[k * n + k];
-        if (!(pivot > 0.0)) return unknown;
-        product *= pivot;
-        if (product < 1e-200 || product > 1e200) sum += std::log(std::exchange(product, 1.0));
-        const double inverse = 1.0 / pivot;
-        for (int c = k + 1; c < n; ++c) {
-          const double by = L[k * n + c] * inverse;
-          for (int r = c; r < n; ++r) L[c * n + r] -= by * L[k * n + r];
-        }
-      }
-      return 0.5 * (sum + std::log(product));
-    });
   }
 };
 

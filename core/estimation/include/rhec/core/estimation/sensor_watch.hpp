@@ -177,8 +177,7 @@ class RHEC_EXPORT SensorWatch {
   std::vector<double> excesses_;               ///< by sensor, mean nu' S^-1 nu by degree of freedom, of late
   std::vector<double> heard_;                  ///< by sensor, when it was measured last [s]; NaN: never
   bool is_unobserved_ = false;                 ///< the motion since the last sample is not known
-  double usual_volume_ = 0.0;  ///< mean log sqrt(det P) of late, where nothing was missing; NaN: none yet
-  int aftermath_ = 0;          ///< estimates since something was missing, counted down
+  double usual_volume_ = 0.0;  ///< mean log sqrt(det P) of late, where nothing was lacking; NaN: none yet
   std::unique_ptr<Hypothesis> own_, slip_, edge_, moved_, back_, blind_;  ///< edge_: slip that goes on jumping
   std::unique_ptr<Memory> memory_;
   bool is_active_ = false, is_disputed_ = false, is_blind_ = false;

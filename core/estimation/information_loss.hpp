@@ -1,0 +1,57 @@
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "walking_filter.hpp"
+
+namespace rhec {
+
+/// How much less is known of states and slip because measurements were lacking: that have not come, or were not used.
+///
+/// Two Kalman filters go along where the judge of measurements is, from what it knew before something was lacking. One
+/// uses what it used; the other one all that was to be expected. Only their covariances matter: derivatives are taken
+/// at the judge's mean, and measurements have no innovations. It ends when both know as much again.
+class InformationLoss {
+ public:
+  InformationLoss(const std::shared_ptr<const Model>& model, const WalkingFilter::Setup& setup);
+  void reset() noexcept;
+
+  bool is_active() const noexcept { return is_active_; }
+  void end() noexcept;
+  /// Samples since something was lacking, while it is active.
+  int samples_since() const noexcept { return samples_since_; }
+  /// By how much the volume of the covariance's ellipsoid is too large: a logarithm, 0 while it is not active.
+  double excess() const noexcept { return excess_; }
+
+  /// From the judge's moments before `duration` [s] with an input (n_u). `more_sigmas` (n_u, or null) as in
+  /// SensorWatch::advance: nobody has said what the input is.
+  void predict(const WalkingFilter& judge, const double* inputs, double duration, const double* more_sigmas) noexcept;
+  /// A sample at a time [s], as the judge expects it, before it is used. `measured` (n_y, NaN where missing): all that
+  /// has come; `used`: what is left of it.
+  void update(const WalkingFilter& judge, double time, const double* measured, Measured used) noexcept;
+  /// After the judge has gone elsewhere at this sample, or by itself.
+  void follow(const WalkingFilter& judge) noexcept;
+
+ private:
+  /// Of an output.
+  struct Rhythm {
+    double interval, counted;  ///< usual one, and the time of its last sample that came or was to come [s]; NaN: none
+  };
+  void begin(const WalkingFilter& judge) noexcept;
+  bool expect_outputs(double time, const double* measured, Measured used) noexcept;
+  void find_excess() noexcept;
+
+  WalkingFilter actual_, complete_;
+  std::vector<Rhythm> rhythms_;             ///< n_y
+  std::vector<double> expected_, weights_;  ///< n_y, what counts of a sample
+  double interval_, last_;                  ///< usual one between samples, and the time of the last one [s]; NaN: none
+  double since_last_ = 0.0;                 ///< [s]
+  double excess_ = 0.0;
+  Eigen::MatrixXd factor_;                  ///< of a covariance
+  int missed_ = 0;                          ///< samples since the last one that have not come
+  int samples_since_ = 0;
+  bool is_active_ = false;
+};
+
+}  // namespace rhec
