@@ -20,6 +20,12 @@ constexpr int hasty_parts = 2;
 // A source is overdue after so many of its usual intervals.
 constexpr double overdue = 1.75;
 constexpr int most_steps = 32;  // of such a part, times those of a usual one
+// A sensor's next measurement is not before this share of its usual interval, and has come after that share, and after
+// so many times that it is usually late.
+constexpr double soonest = 0.75, latest = 1.25, latest_lag = 2.0;
+constexpr double lag_memory = 5.0;      // that is a mean over so many measurements
+constexpr double least_lag = 0.05;      // of an interval: less is jitter
+constexpr double longest_wait = 0.5;    // of the time that nodes can be taken back for
 
 NodeGrid::Setup grid_setup(const EstimationMethod& method, const Estimator::Timeline& timeline) {
   if (!(timeline.longest_interval > 0.0))
@@ -92,6 +98,8 @@ Estimator::Estimator(std::unique_ptr<EstimationMethod> method, const Timeline& t
   for (std::size_t j = sigmas_.size(); j < merged_.size(); ++j)
     sigmas_.push_back(std::sqrt(watch_->setup().noise.output_variances[j]));
   presence_.assign(sensors, SensorWatch::Presence::present);
+  deliveries_.assign(sensors, {0.0, missing_value});
+  newest_row_ = missing_value;
   input_sigmas_.assign(input_.size(), 0.0);
   for (Estimate* e : {&estimate_, &predicted_}) assess(*e, 0.0);
 }
@@ -121,6 +129,9 @@ void Estimator::reset() noexcept {
   watch_->reset();
   clocks_->reset();
   waiting_->clear();
+  std::ranges::fill(deliveries_, Delivery{0.0, missing_value});
+  newest_row_ = missing_value;
+  goes_ahead_ = false;
 }
 
 bool Estimator::reset(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance) noexcept {
@@ -129,7 +140,12 @@ bool Estimator::reset(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covari
   if (!has_started() || !fits || !mean.allFinite() || !covariance.allFinite()) return false;
   if (!method_->rebase(mean, covariance)) return false;
   grid_.settle(method_->reach());
-  if (watch_) watch_->restart(mean, covariance);
+  if (watch_) {
+    watch_->restart(mean, covariance);
+    watched_ = grid_.time();
+    waiting_->drop_front(waiting_->first_after(watched_ + timeline_.tolerance));
+    goes_ahead_ = false;
+  }
   stale_ = true;
   return true;
 }
@@ -200,8 +216,38 @@ void Estimator::push_measurement(double time, const double* outputs, const doubl
   }
 }
 
+/// How late the sensors of a row are, by the newest measurement of all.
+void Estimator::note_delivery(double time, Measured outputs) noexcept {
+  const double lag = newest_row_ > time ? newest_row_ - time : 0.0;
+  for (std::size_t s = 0; s < deliveries_.size(); ++s) {
+    const std::vector<int>& all = watch_->sensors()[s].outputs;
+    if (std::ranges::all_of(all, [&](int j) { return std::isnan(outputs[j]); })) continue;
+    Delivery& each = deliveries_[s];
+    each.lag += (lag - each.lag) / lag_memory;
+    if (!(each.newest >= time)) each.newest = time;
+  }
+  if (!(newest_row_ >= time)) newest_row_ = time;
+}
+
+/// Up to when measurements are judged now, of what is stamped up to a time: those of a sensor that is usually late are
+/// waited for, so that the judge gets all in the order of their stamps.
+double Estimator::judged_until(double time) const noexcept {
+  if (!watch_->is_active()) return time;
+  double until = time;
+  const double now = std::max(time, newest_row_), longest = longest_wait * method_->most_reach() * timeline_.longest_interval;
+  for (std::size_t s = 0; s < deliveries_.size(); ++s) {
+    const auto& [lag, newest] = deliveries_[s];
+    const double interval = clocks_->usual_interval(static_cast<int>(s));
+    if (!(lag > least_lag * interval) || std::isnan(newest)) continue;
+    const double wait = latest * interval + latest_lag * lag;
+    if (wait < longest && now < newest + wait) until = std::min(until, newest + soonest * interval);
+  }
+  return until;
+}
+
 void Estimator::push(double time, Measured outputs) noexcept {
   if (!watch_) return push_judged(time, outputs);
+  note_delivery(time, outputs);
   if (!has_started() || time > watched_ + timeline_.tolerance) {
     counts_.dropped += waiting_->is_full();
     waiting_->insert(time, outputs);
@@ -212,9 +258,11 @@ void Estimator::push(double time, Measured outputs) noexcept {
   push_judged(time, merged_.measured());
 }
 
-void Estimator::push_judged(double time, Measured outputs) noexcept {
+/// `may_be_used`: it may have been used before it was judged, and perhaps in another way.
+void Estimator::push_judged(double time, Measured outputs, bool may_be_used) noexcept {
   const std::int64_t dropped = grid_.dropped();
-  const NodeGrid::Place place = grid_.push_measurement(time, outputs, method_->reach());
+  const NodeGrid::Place place = may_be_used ? grid_.put_measurement(time, outputs, method_->reach())
+                                            : grid_.push_measurement(time, outputs, method_->reach());
   if (place == NodeGrid::Place::late) ++counts_.late;
   counts_.dropped += grid_.dropped() - dropped;
 }
@@ -264,18 +312,26 @@ void Estimator::add_node() noexcept {
   stale_ = true;
 }
 
+/// Puts those measurements that wait from a row on with its stamp together, e.g. of two sensors. The row behind them.
+std::size_t Estimator::merge_waiting(std::size_t row) noexcept {
+  const double time = waiting_->time(row);
+  merged_.clear();
+  for (; row < waiting_->size() && waiting_->time(row) <= time + timeline_.tolerance; ++row)
+    merged_.add(waiting_->measured(row));
+  return row;
+}
+
 /// Judges what is stamped up to a time, in its order, and hands on what passes. False if the time was up before.
 bool Estimator::judge_waiting(double until, Clock::time_point deadline) noexcept {
-  for (int judged = 0; waiting_->size() > 0 && waiting_->time(0) <= until + timeline_.tolerance; ++judged) {
-    if (judged > 0 && is_past(deadline)) return false;
+  const double last = judged_until(until);
+  bool is_new = false;
+  const auto has_next = [&] { return waiting_->size() > 0 && waiting_->time(0) <= last + timeline_.tolerance; };
+  for (; has_next(); is_new = true) {
+    if (is_new && is_past(deadline)) return false;
     const double time = waiting_->time(0);
-    merged_.clear();
-    std::size_t same = 0;  // rows with this stamp, e.g. of two sensors
-    for (; same < waiting_->size() && waiting_->time(same) <= time + timeline_.tolerance; ++same)
-      merged_.add(waiting_->measured(same));
-    waiting_->drop_front(same);
+    waiting_->drop_front(merge_waiting(0));
     const SensorWatch::Finding finding = judge(time, merged_, deadline);
-    push_judged(time, merged_.measured());
+    push_judged(time, merged_.measured(), goes_ahead_ && time <= ahead_ + timeline_.tolerance);
     if (finding.release) {
       for (int i = 0; i < watch_->held_count(); ++i)
         push_judged(watch_->held()[i].time, watch_->held()[i].outputs.measured());
@@ -286,18 +342,53 @@ bool Estimator::judge_waiting(double until, Clock::time_point deadline) noexcept
       grid_.retract(wrong.jumps_from, wrong.outputs_from, wrong.outputs);
     }
     bool is_complete = true;
+    if (finding.rebase && goes_ahead_) grid_.outdate(time);
     if (finding.rebase || !watch_->is_active()) is_complete = take_in(time, deadline);
     if (finding.rebase) {
       // What was measured before counts no longer.
       if (!is_complete) grid_.skip_to(time);
       rebase(watch_->mean(), watch_->covariance());
     }
-    const bool is_last = waiting_->size() == 0 || !(waiting_->time(0) <= until + timeline_.tolerance);
-    if (watch_->is_active() || is_last) continue;
+    if (watch_->is_active() || !has_next()) continue;
     // There is nothing to judge the next one by yet.
     method_->estimate(estimate_, deadline);
     clip(estimate_);
     watch_->follow(estimate_);
+  }
+  const bool is_behind = waiting_->size() > 0 && waiting_->time(0) <= until + timeline_.tolerance;
+  if (is_new && is_behind && watch_->is_active()) {
+    // The judge goes on from what the estimator says of the last sample that it has judged.
+    if (goes_ahead_) grid_.outdate(watched_);
+    if (take_in(watched_, deadline) && !is_past(deadline)) {
+      method_->estimate(estimate_, deadline);
+      clip(estimate_);
+      watch_->follow(estimate_);
+    }
+  }
+  return judge_ahead(until, is_new, deadline);
+}
+
+/// Uses what waits for late measurements, up to a time, as far as it passes its gates. `is_new`: those used before are
+/// to be looked at again. False if the time was up before.
+bool Estimator::judge_ahead(double until, bool is_new, Clock::time_point deadline) noexcept {
+  if (waiting_->size() == 0 || waiting_->time(0) > until + timeline_.tolerance) {
+    goes_ahead_ = false;
+    return true;
+  }
+  if (is_new || !goes_ahead_) {
+    watch_->begin_ahead();
+    ahead_ = watched_;
+  }
+  goes_ahead_ = true;
+  std::size_t row = waiting_->first_after(ahead_ + timeline_.tolerance);
+  for (int count = 0; row < waiting_->size() && waiting_->time(row) <= until + timeline_.tolerance; ++count) {
+    if (count > 0 && is_past(deadline)) return false;
+    const double time = waiting_->time(row);
+    row = merge_waiting(row);
+    watch_->advance_ahead(time - ahead_, grid_.mean_input(ahead_, time));
+    watch_->judge_ahead(merged_.values(), merged_.measured().weights);
+    ahead_ = time;
+    push_judged(time, merged_.measured(), true);
   }
   return true;
 }
@@ -485,7 +576,7 @@ const Estimate& Estimator::estimate(double time, Clock::time_point deadline) noe
     clip(estimate_);
     stale_ = false;
     // The judge is where the last sample is that it has judged.
-    if (watch_ && is_all_taken_in) watch_->follow(estimate_);
+    if (watch_ && is_all_taken_in && !goes_ahead_) watch_->follow(estimate_);
     if (!(is_all_judged && is_all_taken_in) && is_usable(estimate_.report.status))
       estimate_.report.status = Status::deadline;
     ++counts_.estimates;

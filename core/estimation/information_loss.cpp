@@ -12,8 +12,9 @@ namespace {
 
 constexpr double none = std::numeric_limits<double>::quiet_NaN();
 constexpr double gap = 1.5;              // an interval that is longer than so many usual ones is one
-constexpr double to_new_interval = 0.1;  // of the usual interval
-constexpr double jitter = 0.05;          // of an interval
+constexpr double to_new_interval = 0.1, most_of_old = 2.0;  // a gap changes the usual interval by little
+constexpr double jitter = 0.05;          // of an interval, at least
+constexpr double deviations = 4.0;       // by which a sample is later than usual that does not come
 constexpr double as_good_as_equal = 0.05;  // of the logarithm of a volume
 
 /// Takes an interval between two times of a sequence into the usual one.
@@ -21,24 +22,37 @@ void note_interval(double interval, double& usual) noexcept {
   if (!(interval > 0.0)) return;
   if (std::isnan(usual))
     usual = interval;
-  else if (interval < gap * usual)
-    usual += to_new_interval * (interval - usual);
+  else
+    usual += to_new_interval * (std::min(interval, most_of_old * usual) - usual);
 }
 
 }  // namespace
+
+bool InformationLoss::Rhythm::is_due(double time) const noexcept {
+  return time - counted > (1.0 - jitter) * interval + deviations * deviation;
+}
+
+void InformationLoss::Rhythm::hear(double time) noexcept {
+  const double last = time - heard;
+  if (last > 0.0 && !std::isnan(interval))
+    deviation += to_new_interval * (std::min(std::abs(last - interval), interval) - deviation);
+  note_interval(last, interval);
+  heard = counted = time;
+}
 
 InformationLoss::InformationLoss(const std::shared_ptr<const Model>& model, const WalkingFilter::Setup& setup)
     : actual_(model, setup), complete_(model, setup) {
   const auto ny = static_cast<std::size_t>(model->output_count());
   rhythms_.assign(ny, {});
-  expected_.assign(ny, none);
+  expected_.assign(ny, false);
+  values_.assign(ny, none);
   weights_.assign(ny, 1.0);
   factor_ = actual_.covariance();
   reset();
 }
 
 void InformationLoss::reset() noexcept {
-  std::ranges::fill(rhythms_, Rhythm{none, none});
+  std::ranges::fill(rhythms_, Rhythm{none, 0.0, none, none});
   interval_ = last_ = none;
   since_last_ = 0.0;
   missed_ = 0;
@@ -67,9 +81,9 @@ void InformationLoss::predict(const WalkingFilter& judge, const double* inputs, 
     if (since_last_ > (missed_ + 1.0 - jitter) * interval_) {
       ++missed_;
       complete_.expect();
-      for (std::size_t j = 0; j < expected_.size(); ++j)
-        expected_[j] = std::isnan(rhythms_[j].interval) ? none : complete_.expected(static_cast<int>(j));
-      complete_.update_as_expected(expected_.data());
+      for (std::size_t j = 0; j < values_.size(); ++j)
+        values_[j] = std::isnan(rhythms_[j].interval) ? none : complete_.expected(static_cast<int>(j));
+      complete_.update_as_expected(values_.data());
     }
     actual_.predict(inputs, duration, more_sigmas);
     complete_.predict(inputs, duration);
@@ -77,47 +91,40 @@ void InformationLoss::predict(const WalkingFilter& judge, const double* inputs, 
   since_last_ += duration;
 }
 
-/// What counts of a sample; whether some of it was not used.
-bool InformationLoss::expect_outputs(double time, const double* measured, Measured used) noexcept {
-  bool is_lacking = false;
-  for (std::size_t j = 0; j < rhythms_.size(); ++j) {
-    const auto output = static_cast<std::ptrdiff_t>(j);
-    auto& [interval, counted] = rhythms_[j];
-    const bool has_come = !std::isnan(measured[j]);
-    const bool was_due = time - counted > (1.0 - jitter) * interval;
-    if (has_come) {
-      note_interval(time - counted, interval);
-      counted = time;
-    } else if (was_due) {
-      counted = time - counted > 2.0 * interval ? time : counted + interval;
-    }
-    expected_[j] = has_come || was_due ? 0.0 : none;
-    weights_[j] = has_come ? used.weight(output) : 1.0;
-    is_lacking = is_lacking || (!std::isnan(expected_[j]) && std::isnan(used[output]));
-  }
-  return is_lacking;
-}
-
-void InformationLoss::update(const WalkingFilter& judge, double time, const double* measured, Measured used) noexcept {
+void InformationLoss::note(double time, const double* measured) noexcept {
   note_interval(time - last_, interval_);
   last_ = time;
   since_last_ = 0.0;
   missed_ = 0;
-  if (expect_outputs(time, measured, used))
+  for (std::size_t j = 0; j < rhythms_.size(); ++j) {
+    Rhythm& rhythm = rhythms_[j];
+    const bool has_come = !std::isnan(measured[j]), was_due = !has_come && rhythm.is_due(time);
+    if (has_come)
+      rhythm.hear(time);
+    else if (was_due)
+      rhythm.counted = time - rhythm.counted > 2.0 * rhythm.interval ? time : rhythm.counted + rhythm.interval;
+    expected_[j] = has_come || was_due;
+  }
+}
+
+void InformationLoss::update(const WalkingFilter& judge, Measured used) noexcept {
+  bool is_lacking = false;
+  for (std::size_t j = 0; j < expected_.size(); ++j)
+    is_lacking = is_lacking || (expected_[j] && std::isnan(used[static_cast<std::ptrdiff_t>(j)]));
+  if (is_lacking)
     begin(judge);
   else
     ++samples_since_;
   if (!is_active_) return;
-  copy_numbers(judge.mean(), complete_.mean());
-  complete_.expect();
-  for (std::size_t j = 0; j < expected_.size(); ++j)
-    if (!std::isnan(expected_[j])) expected_[j] = complete_.expected(static_cast<int>(j));
-  complete_.update_as_expected({expected_.data(), weights_.data()});
-  copy_numbers(judge.mean(), actual_.mean());
-  actual_.expect();
-  for (std::size_t j = 0; j < expected_.size(); ++j)
-    expected_[j] = std::isnan(used[static_cast<std::ptrdiff_t>(j)]) ? none : actual_.expected(static_cast<int>(j));
-  actual_.update_as_expected({expected_.data(), used.weights});
+  for (std::size_t j = 0; j < weights_.size(); ++j) weights_[j] = used.weight(static_cast<std::ptrdiff_t>(j));
+  const auto take = [&](WalkingFilter& filter, auto&& counts) {
+    copy_numbers(judge.mean(), filter.mean());
+    filter.expect();
+    for (std::size_t j = 0; j < values_.size(); ++j) values_[j] = counts(j) ? filter.expected(static_cast<int>(j)) : none;
+    filter.update_as_expected({values_.data(), weights_.data()});
+  };
+  take(complete_, [&](std::size_t j) { return expected_[j]; });
+  take(actual_, [&](std::size_t j) { return !std::isnan(used[static_cast<std::ptrdiff_t>(j)]); });
   find_excess();
 }
 

@@ -24,27 +24,34 @@ class InformationLoss {
   /// By how much the volume of the covariance's ellipsoid is too large: a logarithm, 0 while it is not active.
   double excess() const noexcept { return excess_; }
 
+  /// A sample at a time [s] with these outputs (n_y, NaN where missing).
+  void note(double time, const double* measured) noexcept;
+  /// Whether an output has come with it, or was to come.
+  bool is_expected(int output) const noexcept { return expected_[static_cast<std::size_t>(output)]; }
+
   /// From the judge's moments before `duration` [s] with an input (n_u). `more_sigmas` (n_u, or null) as in
   /// SensorWatch::advance: nobody has said what the input is.
   void predict(const WalkingFilter& judge, const double* inputs, double duration, const double* more_sigmas) noexcept;
-  /// A sample at a time [s], as the judge expects it, before it is used. `measured` (n_y, NaN where missing): all that
-  /// has come; `used`: what is left of it.
-  void update(const WalkingFilter& judge, double time, const double* measured, Measured used) noexcept;
+  /// That sample, before the judge uses what is left of it (n_y).
+  void update(const WalkingFilter& judge, Measured used) noexcept;
   /// After the judge has gone elsewhere at this sample, or by itself.
   void follow(const WalkingFilter& judge) noexcept;
 
  private:
-  /// Of an output.
+  /// Of an output [s]; NaN: none.
   struct Rhythm {
-    double interval, counted;  ///< usual one, and the time of its last sample that came or was to come [s]; NaN: none
+    double interval, deviation;  ///< usual one, and by how much one differs from that, on average
+    double heard, counted;       ///< times of its last sample, and of the last one that came or was to come
+    bool is_due(double time) const noexcept;
+    void hear(double time) noexcept;
   };
   void begin(const WalkingFilter& judge) noexcept;
-  bool expect_outputs(double time, const double* measured, Measured used) noexcept;
   void find_excess() noexcept;
 
   WalkingFilter actual_, complete_;
   std::vector<Rhythm> rhythms_;             ///< n_y
-  std::vector<double> expected_, weights_;  ///< n_y, what counts of a sample
+  std::vector<bool> expected_;              ///< n_y, of the last sample
+  std::vector<double> values_, weights_;    ///< n_y, what counts of it
   double interval_, last_;                  ///< usual one between samples, and the time of the last one [s]; NaN: none
   double since_last_ = 0.0;                 ///< [s]
   double excess_ = 0.0;

@@ -491,7 +491,7 @@ void SensorWatch::test_inputs(const double* outputs) noexcept {
   trial.mean() = memory_->before_mean;
   trial.covariance() = memory_->before_covariance;
   trial.predict(input_.data(), memory_->duration);
-  trusted_samples_ = fits(trial, outputs) ? trusted_samples_ + 1 : 0;
+  trusted_samples_ = fits(trial, outputs) ? trusted_samples_ + memory_->is_beat : 0;
   if (trusted_samples_ >= trusted_again) is_blind_ = false;
 }
 

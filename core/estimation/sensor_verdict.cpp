@@ -47,6 +47,29 @@ void SensorWatch::judge_late(double time, double* outputs, const double* weights
   }
 }
 
+void SensorWatch::begin_ahead() noexcept {
+  copy_numbers(own_->filter.mean(), memory_->ahead->mean());
+  copy_numbers(own_->filter.covariance(), memory_->ahead->covariance());
+}
+
+void SensorWatch::advance_ahead(double duration, const double* inputs) noexcept {
+  memory_->ahead->predict(is_blind_ ? believed_input_.data() : inputs, duration);
+}
+
+void SensorWatch::judge_ahead(double* outputs, const double* weights) noexcept {
+  memory_->offsets->correct(outputs);
+  if (!is_active_ || is_searching() || is_blind_) return;
+  WalkingFilter& filter = *memory_->ahead;
+  filter.expect();
+  for (std::size_t s = 0; s < sensors_.size(); ++s) {
+    if (!filter.innovation(sensors_[s], {outputs, weights}, scratch_)) continue;
+    const bool is_doubted = records_[s].failures > 0 || (states_[s].reasons & reason::stuck) != 0;
+    if (!is_doubted && scratch_.nis <= limit(s, scratch_.value.size())) continue;
+    for (const int j : sensors_[s].outputs) outputs[j] = Memory::unknown;
+  }
+  filter.update_as_expected({outputs, weights});
+}
+
 void SensorWatch::follow(const Estimate& estimate) noexcept {
   const Model& model = own_->filter.model();
   const Eigen::Index nx = model.state_count(), np = model.parameter_count(), n = nx + np;
@@ -75,12 +98,12 @@ void SensorWatch::widen(Estimate& estimate) noexcept {
   const Eigen::MatrixXd& covariance = slip_->filter.covariance();
   if (!(slip_probability_ > 0.0) || estimate.covariance.rows() != n || !mean.allFinite() || !covariance.allFinite())
     return;
+  // The judge is where the estimate is, or before it, while late measurements are waited for.
   Eigen::VectorXd& away = memory_->away;
-  away.head(nx) = mean.head(nx) - estimate.state;
-  away.tail(n - nx) = mean.tail(n - nx) - estimate.parameters;
+  away = mean - own_->filter.mean();
   for (Eigen::Index j = 0; j < nx; ++j)
     if (model.description().states[static_cast<std::size_t>(j)].is_angle)
-      away[j] = angle_difference(mean[j], estimate.state[j]);
+      away[j] = angle_difference(mean[j], own_->filter.mean()[j]);
   const bool is_of_position = std::ranges::any_of(memory_->first_errors, [](double each) { return !std::isnan(each); });
   // Who goes along with what a compass says of slip for a sample does not leave its place.
   const double share = memory_->was_open && !is_of_position ? slip_probability_ : 0.0;

@@ -115,6 +115,7 @@ SensorWatch::SensorWatch(std::shared_ptr<const Model> model, const Setup& setup)
   memory_ = std::make_unique<Memory>();
   memory_->stuck = StuckValues(setup_.noise.output_variances);
   memory_->trial = std::make_unique<WalkingFilter>(model, filter_setup(setup_));
+  memory_->ahead = std::make_unique<WalkingFilter>(model, filter_setup(setup_));
   memory_->loss = std::make_unique<InformationLoss>(model, filter_setup(setup_));
   own_->filter.expect();
   std::vector<OffsetWatch::Watched> watched;
@@ -275,9 +276,28 @@ Measured SensorWatch::weighed(const double* outputs) const noexcept {
   return {outputs, raw_weights_.empty() ? nullptr : raw_weights_.data()};
 }
 
+bool SensorWatch::is_expected(std::size_t sensor) const noexcept {
+  return std::ranges::any_of(sensors_[sensor].outputs, [&](int j) { return memory_->loss->is_expected(j); });
+}
+
+/// Which sensors have come, or were to come. What is counted in samples counts those of the position, if there is one:
+/// a quick sensor beside it says little, however often. 1 of such a sample, 0 of another.
+int SensorWatch::note_sample(double time, const double* outputs) noexcept {
+  memory_->loss->note(time, outputs);
+  bool has_position = false, is_position = false;
+  for (std::size_t s = 0; s < sensors_.size(); ++s) {
+    if (!sees_position(sensors_[s].outputs)) continue;
+    has_position = true;
+    is_position = is_position || is_expected(s);
+  }
+  memory_->is_beat = is_position || !has_position;
+  return memory_->is_beat;
+}
+
 SensorWatch::Finding SensorWatch::judge(double time, double* outputs, const double* weights) noexcept {
-  if (memory_->since_release < std::numeric_limits<int>::max()) ++memory_->since_release;
   memory_->has_advanced = false;
+  const int beat = note_sample(time, outputs);
+  if (memory_->since_release < std::numeric_limits<int>::max()) memory_->since_release += beat;
   std::fill(findings_.begin(), findings_.end(), 0u);
   held_count_ = is_disputed_ ? held_count_ : 0;
   Finding finding;
@@ -337,12 +357,12 @@ SensorWatch::Finding SensorWatch::judge(double time, double* outputs, const doub
       for (std::size_t j = 0; j < input_.size() && !is_blind_; ++j)
         if (!std::isnan(input_[j])) believed_input_[j] = input_[j];
     }
-    memory_->loss->update(filter, time, raw_.data(), weighed(outputs));
+    memory_->loss->update(filter, weighed(outputs));
     if (!finding.rebase && !finding.release) {
       copy_numbers(filter.mean(), memory_->before_update);
       filter.update_as_expected(weighed(outputs));
       double& beyond = memory_->beyond_bounds;
-      beyond += Memory::slip_beyond_bounds(filter, memory_->before_update, setup_.noise) - usually_beyond;
+      beyond += Memory::slip_beyond_bounds(filter, memory_->before_update, setup_.noise) - beat * usually_beyond;
       beyond = std::min(std::max(beyond, 0.0), 2.0 * impossibly_beyond);
       if (beyond > impossibly_beyond) {
         input_findings_ |= reason::implausible;
@@ -396,17 +416,17 @@ SensorWatch::Finding SensorWatch::judge(double time, double* outputs, const doub
   bool is_calm = input_findings_ == 0;
   const bool is_open = is_probably_slip();
   memory_->was_open = is_open;
-  memory_->undisputed_samples = is_disputed_ ? 0 : std::min(memory_->undisputed_samples + 1, setup_.calm);
+  memory_->undisputed_samples = is_disputed_ ? 0 : std::min(memory_->undisputed_samples + beat, setup_.calm);
   for (std::size_t s = 0; s < sensors_.size(); ++s) {
     if (is_open && findings_[s] == reason::rejected) continue;
     is_calm = is_calm && findings_[s] == 0;
-    quiet_[s] = findings_[s] ? 0 : quiet_[s] + 1;
+    quiet_[s] = findings_[s] ? 0 : quiet_[s] + is_expected(s);
     if (findings_[s]) states_[s].reasons = findings_[s] | (states_[s].reasons & reason::moved);
     const bool has_moved = (states_[s].reasons & reason::moved) != 0;
     const int calm = has_moved && !memory_->was_return ? setup_.calm_after_moving : setup_.calm;
     if (quiet_[s] >= calm) states_[s].reasons = 0;
   }
-  calm_samples_ = is_calm ? calm_samples_ + 1 : 0;
+  calm_samples_ = is_calm ? calm_samples_ + beat : 0;
   if (input_findings_) inputs_.reasons = input_findings_;
   if (calm_samples_ >= setup_.calm) inputs_.reasons = 0;
   input_findings_ = 0;

@@ -129,9 +129,10 @@ struct SensorWatch::Memory {
   bool was_calm = true;        ///< health was ok when the dispute began, and there had been none for some time
   bool was_open = false;       ///< what was disputed at the last sample was probably slip, and nothing was said of it
   int undisputed_samples = 0;  ///< in a row
+  bool is_beat = true;         ///< of samples, those count that have a position, or were to have one
   std::array<double, 2> jumps{};                        ///< behind which slip has been made anew for what is disputed
   int jump_count = 0;                                   ///< of these
-  int since_release = std::numeric_limits<int>::max();  ///< samples since slip was found to have jumped
+  int since_release = std::numeric_limits<int>::max();  ///< beats since slip was found to have jumped
   double disputed_from = unknown;                       ///< behind this time what is disputed was measured
   Retraction released{unknown, unknown, nullptr};       ///< what would have to be taken back of that
   std::vector<double> retracted;                        ///< n_y, not missing of outputs that were wrong then
@@ -141,6 +142,7 @@ struct SensorWatch::Memory {
   std::unique_ptr<OffsetWatch> offsets;
   std::unique_ptr<InformationLoss> loss;
   std::unique_ptr<WalkingFilter> trial;   ///< for what is tried within one call
+  std::unique_ptr<WalkingFilter> ahead;   ///< behind the last sample that was judged
   std::unique_ptr<HeadingSearch> search;  ///< null for a vehicle without a heading
   /// The same, of a heading that may be wrong, while it is not known who is.
   std::unique_ptr<HeadingSearch> second_thought;

@@ -45,12 +45,24 @@ void StampedRows::drop_front(std::size_t rows) noexcept {
   if (count_ == 0) first_ = 0;
 }
 
-std::size_t MeasuredRows::insert(double time, Measured measured) noexcept {
+void MeasuredRows::write_row(Measured measured) noexcept {
   for (int j = 0; j < outputs_; ++j) {
     row_[j] = measured[j];
     row_[outputs_ + j] = measured.weight(j);
   }
+}
+
+std::size_t MeasuredRows::insert(double time, Measured measured) noexcept {
+  write_row(measured);
   return StampedRows::insert(time, row_.data());
+}
+
+bool MeasuredRows::replace(std::size_t i, Measured measured) noexcept {
+  write_row(measured);
+  const auto is_same = [](double a, double b) { return a == b || (std::isnan(a) && std::isnan(b)); };
+  if (std::equal(row_.begin(), row_.end(), values(i), is_same)) return false;
+  std::ranges::copy(row_, row(i));
+  return true;
 }
 
 void MeasuredRows::remove(std::size_t i, const double* y) noexcept {

@@ -51,8 +51,8 @@ struct JudgedBoat {
     judge.predict(input.data(), duration, more_sigmas);
   }
   void measure(const std::vector<double>& measured, const std::vector<double>& used) {
-    judge.expect();
-    loss.update(judge, time, measured.data(), used.data());
+    loss.note(time, measured.data());
+    loss.update(judge, used.data());
     judge.update(used.data());
   }
   /// The same with what was to be expected.
@@ -133,7 +133,7 @@ TEST(InformationLoss, ASlowSensorIsNotMissing) {
   for (int k = 0; k < 60; ++k) {
     const std::vector<double>& all = k % 3 == 0 ? both : first_only;
     boat.take(all, all);
-    if (k > 0) EXPECT_FALSE(boat.loss.is_active()) << k;
+    EXPECT_FALSE(boat.loss.is_active()) << k;
   }
   boat.take(first_only, first_only);
   EXPECT_TRUE(boat.loss.is_active());
@@ -156,8 +156,8 @@ TEST(InformationLoss, IsNotToldWhereSomethingIsKnown) {
   boat.judge.covariance().col(3).setZero();
   boat.setup.walk = {0.0};
   InformationLoss loss(boat.model, boat.setup);
-  boat.judge.expect();
-  loss.update(boat.judge, 0.1, both.data(), none.data());
+  loss.note(0.1, both.data());
+  loss.update(boat.judge, none.data());
   EXPECT_TRUE(loss.is_active());
   EXPECT_EQ(loss.excess(), 0.0);
 }

@@ -103,10 +103,14 @@ class RHEC_EXPORT Estimator {
  private:
   const double* weigh(const double* sigmas) noexcept;
   void push(double time, Measured outputs) noexcept;
-  void push_judged(double time, Measured outputs) noexcept;
+  void push_judged(double time, Measured outputs, bool may_be_used = false) noexcept;
   double place_on_timeline(double stamp, int source) noexcept;
   double place_on_timeline(double stamp, const double* outputs) noexcept;
+  void note_delivery(double time, Measured outputs) noexcept;
+  double judged_until(double time) const noexcept;
+  std::size_t merge_waiting(std::size_t row) noexcept;
   bool judge_waiting(double until, Clock::time_point deadline) noexcept;
+  bool judge_ahead(double until, bool is_new, Clock::time_point deadline) noexcept;
   SensorWatch::Finding judge(double time, MeasuredOutputs& outputs, Clock::time_point deadline) noexcept;
   int inputs_source() const noexcept { return static_cast<int>(presence_.size()); }
   double longest_silence(int source) const noexcept;
@@ -139,6 +143,14 @@ class RHEC_EXPORT Estimator {
   std::unique_ptr<MeasuredRows> waiting_;  ///< measurements that are not judged yet
   double watched_ = 0.0;                   ///< time of the last sample that was judged
   MeasuredOutputs merged_;
+  /// Of a sensor: how far its measurements come behind the newest one of all, on average, and its newest one [s].
+  struct Delivery {
+    double lag, newest;
+  };
+  std::vector<Delivery> deliveries_;
+  double newest_row_ = 0.0;   ///< of all measurements [s]
+  double ahead_ = 0.0;        ///< up to there measurements are used that are not judged yet [s]
+  bool goes_ahead_ = false;   ///< whether there are such
   std::vector<double> input_sigmas_;
   std::vector<SensorWatch::Presence> presence_;
 };

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -38,6 +39,11 @@ class RHEC_EXPORT NodeGrid {
   enum class Place { waits, late, forgotten };
   /// `reach`: how many of the newest nodes can be taken back now.
   Place push_measurement(double time, Measured outputs, int reach) noexcept;
+  /// What was measured at a time becomes this, instead of what there is of that stamp; as `push_measurement` if there is
+  /// nothing.
+  Place put_measurement(double time, Measured outputs, int reach) noexcept;
+  /// Nodes from a time on are to be made anew.
+  void outdate(double time) noexcept { changed_ = std::min(changed_, time); }
   void push_input(double time, const double* inputs) noexcept;
   /// The parameters have jumped soon after a time: at the last node up to there. Nothing happens if that is out of
   /// reach.

@@ -31,11 +31,8 @@ class WalkingFilter;
 ///   - the measured inputs are wrong: they count as typical motion, at every sample. Where neither of the others lasts
 ///     and this does, the estimate goes on without inputs until they fit again.
 /// Where a position fails, another sensor may be wrong that was believed: see docs/health.md.
-/// A measurement that passes its gate again ends all of this.
-///
-/// As long as it is open whether slip has jumped, what is given out is the second moment of both answers (`widen`).
-///
-/// Allocates in its constructor only.
+/// A measurement that passes its gate again ends all of this. As long as it is open whether slip has jumped, what is
+/// given out is the second moment of both answers (`widen`). Allocates in its constructor only.
 class RHEC_EXPORT SensorWatch {
  public:
   using Setup = SensorWatchSetup;
@@ -47,7 +44,6 @@ class RHEC_EXPORT SensorWatch {
   const Setup& setup() const noexcept { return setup_; }
   std::shared_ptr<const FilterMemo> make_memo();  ///< see EstimationMethod::listen
   void reset() noexcept;
-
   /// Marks measured inputs that cannot be as missing (NaN).
   void clean_inputs(double* inputs) noexcept;
   /// The time goes on by `duration` [s], with the mean input (n_u); between two samples in parts, if it is long.
@@ -65,6 +61,11 @@ class RHEC_EXPORT SensorWatch {
   Finding judge(double time, double* outputs, const double* weights = nullptr) noexcept;
   /// Whether a late measurement of a time passes; those outputs that do not become NaN.
   void judge_late(double time, double* outputs, const double* weights = nullptr) noexcept;
+  /// Behind the last sample that was judged, and before late ones that may still change that: from there on, `advance`,
+  /// and whether measurements pass their gates; those outputs that do not become NaN.
+  void begin_ahead() noexcept;
+  void advance_ahead(double duration, const double* inputs) noexcept;
+  void judge_ahead(double* outputs, const double* weights = nullptr) noexcept;
   struct Held {
     double time = 0.0;  ///< [s]
     MeasuredOutputs outputs;
@@ -132,8 +133,8 @@ class RHEC_EXPORT SensorWatch {
   Measured weighed(const double* outputs) const noexcept;
   void find_stuck(double* outputs) noexcept;
   void note_motion(double duration, const double* inputs) noexcept;
-  bool is_searching() const noexcept;
-  int offset_in_dispute() noexcept;
+  bool is_searching() const noexcept, is_expected(std::size_t sensor) const noexcept;
+  int offset_in_dispute() noexcept, note_sample(double time, const double* outputs) noexcept;
   void start_search(const double* outputs) noexcept;
   void search_from(WalkingFilter& filter, HeadingSearch& search) noexcept;
   void think_again() noexcept;

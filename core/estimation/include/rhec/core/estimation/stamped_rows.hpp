@@ -44,8 +44,12 @@ class RHEC_EXPORT MeasuredRows final : public StampedRows {
   Measured measured(std::size_t i) const noexcept { return {values(i), values(i) + outputs_}; }
   /// Row i loses the outputs that are not missing in y (n_y).
   void remove(std::size_t i, const double* y) noexcept;
+  /// Row i keeps its time. False, and nothing else, if that is what it has.
+  bool replace(std::size_t i, Measured measured) noexcept;
 
  private:
+  void write_row(Measured measured) noexcept;
+
   int outputs_;
   std::vector<double> row_;  ///< outputs, then their weights
 };
