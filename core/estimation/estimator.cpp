@@ -23,9 +23,9 @@ constexpr int most_steps = 32;  // of such a part, times those of a usual one
 // A sensor's next measurement is not before this share of its usual interval, and has come after that share, and after
 // so many times that it is usually late.
 constexpr double soonest = 0.75, latest = 1.25, latest_lag = 2.0;
-constexpr double lag_memory = 5.0;      // that is a mean over so many measurements
-constexpr double least_lag = 0.05;      // of an interval: less is jitter
-constexpr double longest_wait = 0.5;    // of the time that nodes can be taken back for
+constexpr double lag_memory = 5.0;    // that is a mean over so many measurements
+constexpr double least_lag = 0.05;    // of an interval: less is jitter
+constexpr double longest_wait = 0.5;  // of the time that nodes can be taken back for
 
 NodeGrid::Setup grid_setup(const EstimationMethod& method, const Estimator::Timeline& timeline) {
   if (!(timeline.longest_interval > 0.0))
@@ -234,7 +234,8 @@ void Estimator::note_delivery(double time, Measured outputs) noexcept {
 double Estimator::judged_until(double time) const noexcept {
   if (!watch_->is_active()) return time;
   double until = time;
-  const double now = std::max(time, newest_row_), longest = longest_wait * method_->most_reach() * timeline_.longest_interval;
+  const double now = std::max(time, newest_row_),
+               longest = longest_wait * method_->most_reach() * timeline_.longest_interval;
   for (std::size_t s = 0; s < deliveries_.size(); ++s) {
     const auto& [lag, newest] = deliveries_[s];
     const double interval = clocks_->usual_interval(static_cast<int>(s));
@@ -469,7 +470,8 @@ void Estimator::assess(Estimate& estimate, double time) noexcept {
   std::uint32_t reasons = !has_started() || (is_estimated && !watch_->is_active()) ? reason::starting : 0;
   for (std::size_t s = 0; s < presence_.size(); ++s) {
     const int source = static_cast<int>(s);
-    const double silence = has_started() ? time - clocks_->newest(source) : 0.0;
+    // One that is usually late is not missed before.
+    const double silence = has_started() ? time - clocks_->newest(source) - deliveries_[s].lag : 0.0;
     presence_[s] = silence > longest_silence(source)                     ? SensorWatch::Presence::silent
                    : silence > overdue * clocks_->usual_interval(source) ? SensorWatch::Presence::overdue
                                                                          : SensorWatch::Presence::present;

@@ -11,11 +11,11 @@ namespace rhec {
 namespace {
 
 constexpr double none = std::numeric_limits<double>::quiet_NaN();
-constexpr double gap = 1.5;              // an interval that is longer than so many usual ones is one
+constexpr double gap = 1.5;                                 // an interval that is longer than so many usual ones is one
 constexpr double to_new_interval = 0.1, most_of_old = 2.0;  // a gap changes the usual interval by little
-constexpr double jitter = 0.05;          // of an interval, at least
-constexpr double deviations = 4.0;       // by which a sample is later than usual that does not come
-constexpr double as_good_as_equal = 0.05;  // of the logarithm of a volume
+constexpr double jitter = 0.05;                             // of an interval, at least
+constexpr double deviations = 4.0;                          // by which a sample is later than usual that does not come
+constexpr double as_good_as_equal = 0.05;                   // of the logarithm of a volume
 
 /// Takes an interval between two times of a sequence into the usual one.
 void note_interval(double interval, double& usual) noexcept {
@@ -120,7 +120,8 @@ void InformationLoss::update(const WalkingFilter& judge, Measured used) noexcept
   const auto take = [&](WalkingFilter& filter, auto&& counts) {
     copy_numbers(judge.mean(), filter.mean());
     filter.expect();
-    for (std::size_t j = 0; j < values_.size(); ++j) values_[j] = counts(j) ? filter.expected(static_cast<int>(j)) : none;
+    for (std::size_t j = 0; j < values_.size(); ++j)
+      values_[j] = counts(j) ? filter.expected(static_cast<int>(j)) : none;
     filter.update_as_expected({values_.data(), weights_.data()});
   };
   take(complete_, [&](std::size_t j) { return expected_[j]; });

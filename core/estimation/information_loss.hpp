@@ -49,14 +49,14 @@ class InformationLoss {
   void find_excess() noexcept;
 
   WalkingFilter actual_, complete_;
-  std::vector<Rhythm> rhythms_;             ///< n_y
-  std::vector<bool> expected_;              ///< n_y, of the last sample
-  std::vector<double> values_, weights_;    ///< n_y, what counts of it
-  double interval_, last_;                  ///< usual one between samples, and the time of the last one [s]; NaN: none
-  double since_last_ = 0.0;                 ///< [s]
+  std::vector<Rhythm> rhythms_;           ///< n_y
+  std::vector<bool> expected_;            ///< n_y, of the last sample
+  std::vector<double> values_, weights_;  ///< n_y, what counts of it
+  double interval_, last_;                ///< usual one between samples, and the time of the last one [s]; NaN: none
+  double since_last_ = 0.0;               ///< [s]
   double excess_ = 0.0;
-  Eigen::MatrixXd factor_;                  ///< of a covariance
-  int missed_ = 0;                          ///< samples since the last one that have not come
+  Eigen::MatrixXd factor_;  ///< of a covariance
+  int missed_ = 0;          ///< samples since the last one that have not come
   int samples_since_ = 0;
   bool is_active_ = false;
 };

@@ -82,8 +82,7 @@ NodeGrid::Place NodeGrid::push_measurement(double time, Measured outputs, int re
 
 NodeGrid::Place NodeGrid::put_measurement(double time, Measured outputs, int reach) noexcept {
   const std::size_t end = measurements_.first_after(time + setup_.tolerance);
-  if (end == 0 || measurements_.time(end - 1) < time - setup_.tolerance)
-    return push_measurement(time, outputs, reach);
+  if (end == 0 || measurements_.time(end - 1) < time - setup_.tolerance) return push_measurement(time, outputs, reach);
   const bool is_late = count_ > 0 && time <= this->time() + setup_.tolerance;
   if (!measurements_.replace(end - 1, outputs) || !is_late) return Place::waits;
   changed_ = std::min(changed_, time);

@@ -155,9 +155,8 @@ void SensorWatch::assess(const Estimate& estimate, std::span<const Presence> pre
     }
     const InformationLoss& loss = *memory_->loss;
     const bool has_lost = loss.excess() > std::log(most_volume) && loss.samples_since() <= aftermath;
-    if ((has_lost && !memory_->was_open) ||
-        (is_overdue && P.rows() == own_->filter.mean().size() &&
-         log_volume(P, memory_->factor) > usual_volume_ + std::log(most_volume))) {
+    if ((has_lost && !memory_->was_open) || (is_overdue && P.rows() == own_->filter.mean().size() &&
+                                             log_volume(P, memory_->factor) > usual_volume_ + std::log(most_volume))) {
       health.reasons |= reason::uncertain;
       has_finding = true;
     }

@@ -137,7 +137,8 @@ struct SensorWatch::Memory {
   Retraction released{unknown, unknown, nullptr};       ///< what would have to be taken back of that
   std::vector<double> retracted;                        ///< n_y, not missing of outputs that were wrong then
   MeasuredOutputs replayed;                             ///< what counts of a sample that is replayed
-  double slip_beyond = 0.0;  ///< how far slip that explains what is disputed is beyond its bounds, in its standard deviations
+  double slip_beyond =
+      0.0;  ///< how far slip that explains what is disputed is beyond its bounds, in its standard deviations
   StuckValues stuck;
   std::unique_ptr<OffsetWatch> offsets;
   std::unique_ptr<InformationLoss> loss;
@@ -163,7 +164,7 @@ struct SensorWatch::Memory {
 
   /// After an update of a filter from a mean: how far slip would be beyond its bounds, in its standard deviations.
   static double slip_beyond_bounds(const WalkingFilter& filter, const Eigen::VectorXd& before,
-                            const KalmanFilter::Noise& noise) noexcept {
+                                   const KalmanFilter::Noise& noise) noexcept {
     double most = 0.0;
     const Eigen::Index nx = filter.model().state_count();
     for (Eigen::Index p = 0; p < std::ssize(noise.parameter_lower); ++p) {

@@ -16,6 +16,20 @@ class Failure(Exception):
 
 
 def read_data(file):
+    """What a file says, and what the one says that it is `like`: `sensors` by vehicle are added to what is set there."""
+    data = read_json(file)
+    if "like" not in data:
+        return data
+    whole = {**read_data(file.parent / data["like"]), **data}
+    for vehicle, sensors in data.get("sensors", {}).items():
+        if vehicle not in whole["vehicles"]:
+            raise Failure(f"{file}: sensors of '{vehicle}', which is no vehicle of {data['like']}; there are {', '.join(whole['vehicles'])}")
+        about = whole["vehicles"][vehicle]
+        about["set"] = [*about.get("set", []), f"sensors={sensors}"]
+    return whole
+
+
+def read_json(file):
     try:
         return json.loads(file.read_text())
     except OSError as problem:

@@ -105,5 +105,25 @@ TEST(NodeGrid, TakesBackJumpsAndWhatWasMeasuredBehindThem) {
   EXPECT_EQ(seen[7], 50.0);
 }
 
+TEST(NodeGrid, WhatWasMeasuredBecomesSomethingElse) {
+  Grid nodes;
+  const auto put = [&](double time, double y) { return nodes.grid.put_measurement(time, &y, reach); };
+  for (int k = 0; k <= 5; ++k) EXPECT_EQ(put(0.2 * k, k), NodeGrid::Place::waits) << "as a new one";
+  EXPECT_EQ(nodes.advance(1.0).size(), 6U);
+  EXPECT_EQ(put(0.8, 4.0), NodeGrid::Place::waits) << "it is what it was";
+  EXPECT_TRUE(nodes.advance(1.0).empty());
+  EXPECT_EQ(put(0.8, 7.0), NodeGrid::Place::late);
+  EXPECT_EQ(nodes.advance(0.8).size(), 1U);
+  EXPECT_EQ(nodes.grid.outputs()[0], 7.0);
+  EXPECT_EQ(put(0.8, std::nan("")), NodeGrid::Place::late);
+  EXPECT_EQ(nodes.advance(0.8).size(), 1U);
+  EXPECT_TRUE(std::isnan(nodes.grid.outputs()[0]));
+  EXPECT_EQ(put(0.8, std::nan("")), NodeGrid::Place::waits) << "nothing, as before";
+  EXPECT_EQ(nodes.advance(1.0).size(), 1U);
+  nodes.grid.outdate(0.6);
+  EXPECT_EQ(nodes.advance(0.6).size(), 1U) << "nodes from there on are taken back";
+  EXPECT_EQ(nodes.advance(1.0).size(), 2U);
+}
+
 }  // namespace node_grid_test
 }  // namespace rhec

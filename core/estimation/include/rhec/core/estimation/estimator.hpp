@@ -148,9 +148,9 @@ class RHEC_EXPORT Estimator {
     double lag, newest;
   };
   std::vector<Delivery> deliveries_;
-  double newest_row_ = 0.0;   ///< of all measurements [s]
-  double ahead_ = 0.0;        ///< up to there measurements are used that are not judged yet [s]
-  bool goes_ahead_ = false;   ///< whether there are such
+  double newest_row_ = 0.0;  ///< of all measurements [s]
+  double ahead_ = 0.0;       ///< up to there measurements are used that are not judged yet [s]
+  bool goes_ahead_ = false;  ///< whether there are such
   std::vector<double> input_sigmas_;
   std::vector<SensorWatch::Presence> presence_;
 };

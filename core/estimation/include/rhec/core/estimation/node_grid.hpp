@@ -39,8 +39,8 @@ class RHEC_EXPORT NodeGrid {
   enum class Place { waits, late, forgotten };
   /// `reach`: how many of the newest nodes can be taken back now.
   Place push_measurement(double time, Measured outputs, int reach) noexcept;
-  /// What was measured at a time becomes this, instead of what there is of that stamp; as `push_measurement` if there is
-  /// nothing.
+  /// What was measured at a time becomes this, instead of what there is of that stamp; as `push_measurement` if there
+  /// is nothing.
   Place put_measurement(double time, Measured outputs, int reach) noexcept;
   /// Nodes from a time on are to be made anew.
   void outdate(double time) noexcept { changed_ = std::min(changed_, time); }

@@ -134,7 +134,7 @@ class RHEC_EXPORT SensorWatch {
   void find_stuck(double* outputs) noexcept;
   void note_motion(double duration, const double* inputs) noexcept;
   bool is_searching() const noexcept, is_expected(std::size_t sensor) const noexcept;
-  int offset_in_dispute() noexcept, note_sample(double time, const double* outputs) noexcept;
+  int offset_in_dispute() noexcept, note_sample(double time, const double*outputs) noexcept;
   void start_search(const double* outputs) noexcept;
   void search_from(WalkingFilter& filter, HeadingSearch& search) noexcept;
   void think_again() noexcept;

@@ -1,0 +1,157 @@
+// A receiver that delivers late beside a quick encoder: faults are judged as if all had come in time.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "support/sensor_faults.hpp"
+
+namespace rhec {
+namespace late_sensor_test {
+
+using namespace rhec::testing;
+
+constexpr double duration = 40.0, asked_every = 0.1, speed = 5.0, wheelbase = 1.4, antenna = 0.4;
+constexpr double fault_begins = 15.0;  // [s]
+
+struct Message {
+  double arrival, stamp;
+  std::vector<double> outputs;
+};
+struct Fault {
+  std::string name;
+  double length;                                      ///< [s]
+  std::function<void(double since, Message&)> spoil;  ///< while it lasts
+  double lost_speed = 0.0;                            ///< share of it that the wheels lose
+};
+struct Sample {
+  double error;  ///< of the position [m]
+  HealthLevel health;
+};
+struct Result {
+  std::vector<Sample> samples;
+  Estimate last;
+  Estimator::Counts counts;
+};
+
+/// Positions at 5 Hz, the steering angle at 20 Hz between them, and inputs as they change.
+Result drive(const char* estimator_name, double lateness, const Fault& fault) {
+  const Robot robot = watched_robot(estimator_name);
+  constexpr double step = 0.01;
+  std::mt19937_64 random(11);
+  std::normal_distribution<double> noise;
+  Eigen::Vector4d truth = Eigen::Vector4d::Zero();
+  const auto estimator = robot.make_estimator(truth);
+  std::vector<Message> messages;
+  std::vector<Eigen::Vector4d> states;
+  std::vector<std::pair<double, std::vector<double>>> inputs;
+  for (int i = 0; i * step < duration; ++i) {
+    const double time = i * step, since = time - fault_begins;
+    const bool is_on = since >= 0.0 && since < fault.length;
+    const double steering = 0.3 * std::cos(0.4 * time), kappa = 0.85 + 0.05 * std::sin(0.2 * time);
+    states.push_back(truth);
+    const auto send = [&](double arrival, std::vector<double> outputs) {
+      messages.push_back({arrival, time, std::move(outputs)});
+      if (is_on && fault.spoil) fault.spoil(since, messages.back());
+    };
+    if (i % 20 == 0)
+      send(time + lateness, {truth[0] - antenna * std::cos(truth[2]) + 0.03 * noise(random),
+                             truth[1] - antenna * std::sin(truth[2]) + 0.03 * noise(random), nan});
+    if (i % 5 == 1) send(time, {nan, nan, truth[3] + 0.017 * noise(random)});
+    if (i % 20 == 0) inputs.push_back({time, {speed + 0.1 * noise(random), steering * 0.4 + 0.1 * noise(random)}});
+    const double v = kappa * speed * (is_on ? 1.0 - fault.lost_speed : 1.0);
+    truth += step * Eigen::Vector4d(v * std::cos(truth[2]), v * std::sin(truth[2]),
+                                    v / wheelbase * std::tan(0.9 * truth[3]), 0.4 * steering);
+  }
+  std::ranges::stable_sort(messages, {}, &Message::arrival);
+  Result result;
+  std::size_t next = 0, next_input = 0;
+  // Beyond the end everything has arrived.
+  for (double now = 0.0; now < duration + 1.0; now += asked_every) {
+    for (; next_input < inputs.size() && inputs[next_input].first <= now; ++next_input)
+      estimator->push_input(inputs[next_input].first, inputs[next_input].second.data());
+    for (; next < messages.size() && messages[next].arrival <= now + 1e-9; ++next)
+      estimator->push_measurement(messages[next].stamp, messages[next].outputs.data());
+    const double asked = std::min(now, duration - step);
+    const Estimate& estimate = estimator->estimate(asked);
+    const Eigen::Vector4d& there = states[static_cast<std::size_t>(std::lround(asked / step))];
+    result.samples.push_back({(estimate.state.head<2>() - there.head<2>()).norm(), estimate.health.level});
+    result.last = estimate;
+  }
+  result.counts = estimator->counts();
+  return result;
+}
+
+void displace(Message& message, double by) {
+  if (!std::isnan(message.outputs[0])) message.outputs[0] += by;
+}
+const Fault faults[] = {
+    {.name = "Nothing", .length = 0.0, .spoil = {}},
+    {.name = "Spikes",
+     .length = 1.9,
+     .spoil = [](double since, Message& m) { displace(m, since < 1.0 ? 30.0 : -20.0); }},
+    {.name = "Offset", .length = 1.9, .spoil = [](double, Message& m) { displace(m, 10.0); }},
+    {.name = "WrongEncoder", .length = 2.0, .spoil = [](double, Message& m) { m.outputs[2] += 0.4; }},
+    {.name = "NoPosition", .length = 6.0, .spoil = [](double, Message& m) { m.outputs[0] = m.outputs[1] = nan; }},
+    {.name = "WheelsThatSpin", .length = 4.0, .spoil = {}, .lost_speed = 0.5},
+};
+
+class LateReceiver : public ::testing::TestWithParam<std::tuple<const char*, Fault>> {
+ protected:
+  const char* estimator = std::get<0>(GetParam());
+  const Fault& fault = std::get<1>(GetParam());
+};
+INSTANTIATE_TEST_SUITE_P(All, LateReceiver,
+                         ::testing::Combine(::testing::Values("ekf", "bank", "rhe"), ::testing::ValuesIn(faults)),
+                         [](const auto& about) {
+                           return std::get<0>(about.param) + ("_" + std::get<1>(about.param).name);
+                         });
+
+/// As fast as if it was not late, but for that.
+TEST_P(LateReceiver, RecoversFromFaults) {
+  const Result late = drive(estimator, 0.17, fault);
+  const auto first = static_cast<std::size_t>((fault_begins + fault.length + 3.0) / asked_every);
+  for (std::size_t k = 0; k < late.samples.size(); ++k) {
+    const bool is_after = k >= first, is_before = k * asked_every > 5.0 && k * asked_every < fault_begins;
+    SCOPED_TRACE(asked_every * static_cast<double>(k));
+    if (is_before || is_after) {
+      EXPECT_LT(late.samples[k].error, 0.4);
+    }
+    if (is_before) {
+      EXPECT_EQ(late.samples[k].health, HealthLevel::ok);
+    }
+  }
+  EXPECT_EQ(late.counts.dropped, 0);
+}
+
+/// Once all is there, it is where it would be.
+TEST_P(LateReceiver, EndsWhereItWouldBeInTime) {
+  const Result late = drive(estimator, 0.17, fault), in_time = drive(estimator, 0.0, fault);
+  const bool is_window = std::string(estimator) == "rhe";
+  const double tolerance = is_window ? 0.2 : 1e-6;  // of a standard deviation; a window is solved by single steps
+  for (Eigen::Index j = 0; j < late.last.state.size(); ++j)
+    EXPECT_NEAR(late.last.state[j], in_time.last.state[j], tolerance * std::sqrt(in_time.last.covariance(j, j))) << j;
+  EXPECT_EQ(late.counts.rejected, in_time.counts.rejected);
+  EXPECT_EQ(late.last.health.level, in_time.last.health.level);
+}
+
+/// A receiver that has moved for good, and is late, is followed after as many of its samples.
+TEST(LateReceivers, ThatHaveMovedAreFollowed) {
+  for (const char* estimator : {"ekf", "bank", "rhe"}) {
+    const Fault fault{.name = "Moved", .length = duration, .spoil = [](double, Message& m) { displace(m, 10.0); }};
+    const Result late = drive(estimator, 0.17, fault);
+    const auto error_at = [&](double time) {
+      return late.samples[static_cast<std::size_t>(std::lround(time / asked_every))].error;
+    };
+    EXPECT_LT(error_at(fault_begins + 1.5), 1.0) << estimator << ": not yet";
+    EXPECT_NEAR(error_at(fault_begins + 3.5), 10.0, 0.5) << estimator << ": it has moved by 10 m";
+    EXPECT_NEAR(late.samples.back().error, 10.0, 0.5) << estimator;
+  }
+}
+
+}  // namespace late_sensor_test
+}  // namespace rhec
