@@ -62,6 +62,7 @@ void InformationLoss::reset() noexcept {
 void InformationLoss::end() noexcept {
   is_active_ = false;
   excess_ = 0.0;
+  samples_above_ = 0;
 }
 
 void InformationLoss::begin(const WalkingFilter& judge) noexcept {
@@ -138,6 +139,7 @@ void InformationLoss::follow(const WalkingFilter& judge) noexcept {
 void InformationLoss::find_excess() noexcept {
   excess_ = log_volume(actual_.covariance(), factor_) - log_volume(complete_.covariance(), factor_);
   if (std::isnan(excess_)) excess_ = 0.0;  // of a parameter that is known
+  samples_above_ = excess_ > std::log(most_volume) ? samples_above_ + 1 : 0;
   if (samples_since_ > 0 && excess_ < as_good_as_equal) end();
 }
 

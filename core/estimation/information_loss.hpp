@@ -23,6 +23,9 @@ class InformationLoss {
   int samples_since() const noexcept { return samples_since_; }
   /// By how much the volume of the covariance's ellipsoid is too large: a logarithm, 0 while it is not active.
   double excess() const noexcept { return excess_; }
+  static constexpr double most_volume = 2.0;  ///< of the volume without loss: more is much
+  /// Samples in a row after which it was more.
+  int samples_above() const noexcept { return samples_above_; }
 
   /// A sample at a time [s] with these outputs (n_y, NaN where missing).
   void note(double time, const double* measured) noexcept;
@@ -57,7 +60,7 @@ class InformationLoss {
   double excess_ = 0.0;
   Eigen::MatrixXd factor_;  ///< of a covariance
   int missed_ = 0;          ///< samples since the last one that have not come
-  int samples_since_ = 0;
+  int samples_since_ = 0, samples_above_ = 0;
   bool is_active_ = false;
 };
 

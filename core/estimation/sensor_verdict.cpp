@@ -11,10 +11,7 @@ namespace rhec {
 
 namespace {
 
-// An ellipsoid of more than so many times the volume that it would have if nothing was lacking is a finding, until so
-// many samples after the last one of which something was; the usual volume is a mean over so many estimates before.
-constexpr int aftermath = 10;
-constexpr double most_volume = 2.0, volume_memory = 10.0;
+constexpr double volume_memory = 10.0;  // that the usual volume is a mean over so many estimates before
 
 }  // namespace
 
@@ -154,9 +151,11 @@ void SensorWatch::assess(const Estimate& estimate, std::span<const Presence> pre
       is_lost = true;
     }
     const InformationLoss& loss = *memory_->loss;
-    const bool has_lost = loss.excess() > std::log(most_volume) && loss.samples_since() <= aftermath;
-    if ((has_lost && !memory_->was_open) || (is_overdue && P.rows() == own_->filter.mean().size() &&
-                                             log_volume(P, memory_->factor) > usual_volume_ + std::log(most_volume))) {
+    // Where a sensor has a finding, all is said; a single sample that does not come is not worth a word.
+    const bool has_lost = loss.samples_above() > 1 && loss.samples_since() <= setup_.calm && !memory_->was_open;
+    if ((has_lost && !has_finding) ||
+        (is_overdue && P.rows() == own_->filter.mean().size() &&
+         log_volume(P, memory_->factor) > usual_volume_ + std::log(InformationLoss::most_volume))) {
       health.reasons |= reason::uncertain;
       has_finding = true;
     }

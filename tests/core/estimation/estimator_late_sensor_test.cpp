@@ -11,7 +11,7 @@
 #include "support/sensor_faults.hpp"
 
 namespace rhec {
-namespace late_sensor_test {
+namespace estimator_late_sensor_test {
 
 using namespace rhec::testing;
 
@@ -153,5 +153,5 @@ TEST(LateReceivers, ThatHaveMovedAreFollowed) {
   }
 }
 
-}  // namespace late_sensor_test
+}  // namespace estimator_late_sensor_test
 }  // namespace rhec
