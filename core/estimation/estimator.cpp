@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "rhec/core/base/error.hpp"
+#include "rhec/core/base/infinity.hpp"
 #include "rhec/core/estimation/measurement.hpp"
 
 namespace rhec {
@@ -73,6 +74,7 @@ Estimator::Estimator(std::unique_ptr<EstimationMethod> method, const Timeline& t
       step_error_(method_->model()) {
   const Model& m = method_->model();
   clear_estimates();
+  clear_deliveries();
   input_.assign(m.input_count(), 0.0);
   measured_inputs_ = input_.size() - m.description().noisy_states.size();
   next_.assign(m.state_count(), 0.0);
@@ -98,10 +100,16 @@ Estimator::Estimator(std::unique_ptr<EstimationMethod> method, const Timeline& t
   for (std::size_t j = sigmas_.size(); j < merged_.size(); ++j)
     sigmas_.push_back(std::sqrt(watch_->setup().noise.output_variances[j]));
   presence_.assign(sensors, SensorWatch::Presence::present);
-  deliveries_.assign(sensors, {0.0, missing_value});
-  newest_row_ = missing_value;
+  deliveries_.resize(sensors);
   input_sigmas_.assign(input_.size(), 0.0);
+  clear_deliveries();
   for (Estimate* e : {&estimate_, &predicted_}) assess(*e, 0.0);
+}
+
+void Estimator::clear_deliveries() noexcept {
+  std::ranges::fill(deliveries_, Delivery{0.0, missing_value});
+  newest_row_ = ahead_ = missing_value;
+  used_ = -infinity;
 }
 
 void Estimator::clear_estimates() noexcept {
@@ -129,9 +137,7 @@ void Estimator::reset() noexcept {
   watch_->reset();
   clocks_->reset();
   waiting_->clear();
-  std::ranges::fill(deliveries_, Delivery{0.0, missing_value});
-  newest_row_ = missing_value;
-  goes_ahead_ = false;
+  clear_deliveries();
 }
 
 bool Estimator::reset(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance) noexcept {
@@ -144,7 +150,7 @@ bool Estimator::reset(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covari
     watch_->restart(mean, covariance);
     watched_ = grid_.time();
     waiting_->drop_front(waiting_->first_after(watched_ + timeline_.tolerance));
-    goes_ahead_ = false;
+    ahead_ = missing_value;
   }
   stale_ = true;
   return true;
@@ -332,7 +338,8 @@ bool Estimator::judge_waiting(double until, Clock::time_point deadline) noexcept
     const double time = waiting_->time(0);
     waiting_->drop_front(merge_waiting(0));
     const SensorWatch::Finding finding = judge(time, merged_, deadline);
-    push_judged(time, merged_.measured(), goes_ahead_ && time <= ahead_ + timeline_.tolerance);
+    push_judged(time, merged_.measured(), time <= used_ + timeline_.tolerance);
+    ahead_ = missing_value;
     if (finding.release) {
       for (int i = 0; i < watch_->held_count(); ++i)
         push_judged(watch_->held()[i].time, watch_->held()[i].outputs.measured());
@@ -343,7 +350,7 @@ bool Estimator::judge_waiting(double until, Clock::time_point deadline) noexcept
       grid_.retract(wrong.jumps_from, wrong.outputs_from, wrong.outputs);
     }
     bool is_complete = true;
-    if (finding.rebase && goes_ahead_) grid_.outdate(time);
+    if (finding.rebase && goes_ahead()) grid_.outdate(time);
     if (finding.rebase || !watch_->is_active()) is_complete = take_in(time, deadline);
     if (finding.rebase) {
       // What was measured before counts no longer.
@@ -359,28 +366,24 @@ bool Estimator::judge_waiting(double until, Clock::time_point deadline) noexcept
   const bool is_behind = waiting_->size() > 0 && waiting_->time(0) <= until + timeline_.tolerance;
   if (is_new && is_behind && watch_->is_active()) {
     // The judge goes on from what the estimator says of the last sample that it has judged.
-    if (goes_ahead_) grid_.outdate(watched_);
-    if (take_in(watched_, deadline) && !is_past(deadline)) {
+    if (goes_ahead()) grid_.outdate(watched_);
+    const bool has_time = deadline == Clock::time_point::max() || Clock::now() + solving_ < deadline;
+    if (has_time && take_in(watched_, deadline) && !is_past(deadline)) {
       method_->estimate(estimate_, deadline);
       clip(estimate_);
       watch_->follow(estimate_);
     }
   }
-  return judge_ahead(until, is_new, deadline);
+  return judge_ahead(until, deadline);
 }
 
-/// Uses what waits for late measurements, up to a time, as far as it passes its gates. `is_new`: those used before are
-/// to be looked at again. False if the time was up before.
-bool Estimator::judge_ahead(double until, bool is_new, Clock::time_point deadline) noexcept {
-  if (waiting_->size() == 0 || waiting_->time(0) > until + timeline_.tolerance) {
-    goes_ahead_ = false;
-    return true;
-  }
-  if (is_new || !goes_ahead_) {
+/// Uses what waits for late measurements, up to a time, as far as it passes its gates. False if the time was up before.
+bool Estimator::judge_ahead(double until, Clock::time_point deadline) noexcept {
+  if (waiting_->size() == 0 || waiting_->time(0) > until + timeline_.tolerance) return true;
+  if (std::isnan(ahead_)) {
     watch_->begin_ahead();
     ahead_ = watched_;
   }
-  goes_ahead_ = true;
   std::size_t row = waiting_->first_after(ahead_ + timeline_.tolerance);
   for (int count = 0; row < waiting_->size() && waiting_->time(row) <= until + timeline_.tolerance; ++count) {
     if (count > 0 && is_past(deadline)) return false;
@@ -389,6 +392,7 @@ bool Estimator::judge_ahead(double until, bool is_new, Clock::time_point deadlin
     watch_->advance_ahead(time - ahead_, grid_.mean_input(ahead_, time));
     watch_->judge_ahead(merged_.values(), merged_.measured().weights);
     ahead_ = time;
+    used_ = std::max(used_, time);
     push_judged(time, merged_.measured(), true);
   }
   return true;
@@ -578,7 +582,7 @@ const Estimate& Estimator::estimate(double time, Clock::time_point deadline) noe
     clip(estimate_);
     stale_ = false;
     // The judge is where the last sample is that it has judged.
-    if (watch_ && is_all_taken_in && !goes_ahead_) watch_->follow(estimate_);
+    if (watch_ && is_all_taken_in && !goes_ahead()) watch_->follow(estimate_);
     if (!(is_all_judged && is_all_taken_in) && is_usable(estimate_.report.status))
       estimate_.report.status = Status::deadline;
     ++counts_.estimates;

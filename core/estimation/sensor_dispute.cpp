@@ -182,7 +182,15 @@ void SensorWatch::confront(Hypothesis& hypothesis, const double* outputs, bool c
     refute(hypothesis);
     return;
   }
-  hypothesis.explained += counts;
+  // Where a position is disputed, samples of a quick sensor that fails as well are not proof.
+  hypothesis.explained += counts && (memory_->is_beat || !is_place_disputed());
+}
+
+/// Whether a position has failed at its last sample.
+bool SensorWatch::is_place_disputed() const noexcept {
+  for (std::size_t s = 0; s < sensors_.size(); ++s)
+    if (records_[s].failures > 0 && sees_position(sensors_[s].outputs)) return true;
+  return false;
 }
 
 /// Whether a sensor that sees the position was rejected.

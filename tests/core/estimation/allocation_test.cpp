@@ -48,6 +48,7 @@ struct Options {
   /// By how much an angle is off from some sample on, by samples since then, where measurements are judged.
   double (*off)(int since) = [](int) { return 0.06; };
   std::int64_t least_rejected = 0;  ///< measurements of that angle
+  bool late = false;                ///< positions come a sample later than angles
   int samples = 40;
 };
 
@@ -145,7 +146,8 @@ long allocations_in_the_loop(const Options& options) {
   sim::TruthVehicle vehicle(*model, *field, Eigen::Vector4d::Zero());
   sim::Sensors sensors(*model, {.outputs = {0.03, 0.03, 0.01745}, .inputs = {0.1, 0.1}}, 1);
   std::array<double, 2> measured{};
-  std::array<double, 3> outputs{};
+  std::array<double, 3> outputs{}, positions{}, nothing{};
+  nothing.fill(std::nan(""));
   int fallbacks = 0;
   std::int64_t rejected = 0;
   const long before = allocation_count();
@@ -154,6 +156,13 @@ long allocations_in_the_loop(const Options& options) {
     sensors.observe(vehicle.state().data(), outputs.data());
     if (k % 7 == 6) outputs[k % 3] = std::nan("");
     if (options.watched && k >= 12) outputs[2] += options.off(k - 12);
+    if (options.late) {
+      if (k > 0) estimator.push_measurement(time - 0.2, positions.data());
+      positions = outputs;
+      positions[2] = std::nan("");
+      outputs[0] = outputs[1] = std::nan("");
+      if (k % 11 == 10) positions[0] += 50.0;
+    }
     if (k != 20) estimator.push_measurement(time, outputs.data());  // a gap
     const Estimate& estimate = estimator.estimate(time);
     fallbacks += estimate.fallback;
@@ -162,7 +171,7 @@ long allocations_in_the_loop(const Options& options) {
     if (k % 2) estimator.prepare();
     if (k % 5 == 0) estimator.rehearse();
     if (k % 3) controller.prepare();
-    if (k % 5 == 4) estimator.push_measurement(time - 0.4, outputs.data());  // late
+    if (k % 5 == 4) estimator.push_measurement(time - 0.4, options.late ? nothing.data() : outputs.data());  // late
     vehicle.advance(command.inputs.data(), 0.2);
     sensors.measure_inputs(command.inputs.data(), measured.data());
     estimator.push_input(time, measured.data());
@@ -218,6 +227,16 @@ TEST(EstimationAllocation, NoneWhereASensorIsSuspected) {
   EXPECT_EQ(allocations_in_the_loop(options), 0);
   options.filter = false;
   options.bank = true;
+  EXPECT_EQ(allocations_in_the_loop(options), 0);
+}
+
+TEST(EstimationAllocation, NoneWherePositionsAreLate) {
+  Options options{.filter = true, .watched = true, .off = [](int) { return 0.0; }, .late = true, .samples = 150};
+  EXPECT_EQ(allocations_in_the_loop(options), 0);
+  options.filter = false;
+  options.bank = true;
+  EXPECT_EQ(allocations_in_the_loop(options), 0);
+  options.priors = true;
   EXPECT_EQ(allocations_in_the_loop(options), 0);
 }
 

@@ -110,7 +110,9 @@ class RHEC_EXPORT Estimator {
   double judged_until(double time) const noexcept;
   std::size_t merge_waiting(std::size_t row) noexcept;
   bool judge_waiting(double until, Clock::time_point deadline) noexcept;
-  bool judge_ahead(double until, bool is_new, Clock::time_point deadline) noexcept;
+  bool judge_ahead(double until, Clock::time_point deadline) noexcept;
+  /// Whether measurements are used that are not judged yet.
+  bool goes_ahead() const noexcept { return used_ > watched_ + timeline_.tolerance; }
   SensorWatch::Finding judge(double time, MeasuredOutputs& outputs, Clock::time_point deadline) noexcept;
   int inputs_source() const noexcept { return static_cast<int>(presence_.size()); }
   double longest_silence(int source) const noexcept;
@@ -124,7 +126,7 @@ class RHEC_EXPORT Estimator {
   void clip(Estimate& estimate) const noexcept;
   void predict_to(double time, Clock::time_point deadline) noexcept;
   void check_integration() noexcept;
-  void clear_estimates() noexcept;
+  void clear_estimates() noexcept, clear_deliveries() noexcept;
 
   std::unique_ptr<EstimationMethod> method_;
   Timeline timeline_;
@@ -145,12 +147,12 @@ class RHEC_EXPORT Estimator {
   MeasuredOutputs merged_;
   /// Of a sensor: how far its measurements come behind the newest one of all, on average, and its newest one [s].
   struct Delivery {
-    double lag, newest;
+    double lag = 0.0, newest = 0.0;
   };
   std::vector<Delivery> deliveries_;
-  double newest_row_ = 0.0;  ///< of all measurements [s]
-  double ahead_ = 0.0;       ///< up to there measurements are used that are not judged yet [s]
-  bool goes_ahead_ = false;  ///< whether there are such
+  double newest_row_ = 0.0;  ///< stamp of the newest measurement of all [s]; NaN: none
+  double ahead_ = 0.0;       ///< how far the judge has looked ahead [s]; NaN: not since the last sample that was judged
+  double used_ = 0.0;        ///< up to there measurements have been used before they were judged [s]
   std::vector<double> input_sigmas_;
   std::vector<SensorWatch::Presence> presence_;
 };

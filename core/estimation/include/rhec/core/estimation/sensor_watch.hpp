@@ -163,7 +163,8 @@ class RHEC_EXPORT SensorWatch {
   void hold_back(double time, const double* outputs) noexcept;
   void acquit(const double*outputs) noexcept, end_dispute() noexcept;
   bool sees_position(int output) const noexcept, sees_position(const std::vector<int>&outputs) const noexcept;
-  bool is_position_disputed() const noexcept, is_place_lost() const noexcept, is_placed_otherwise() const noexcept;
+  bool is_position_disputed() const noexcept, is_place_disputed() const noexcept;
+  bool is_place_lost() const noexcept, is_placed_otherwise() const noexcept;
   bool is_within_bounds(const Eigen::VectorXd&mean) const noexcept, is_probably_slip() const noexcept;
   void test_inputs(const double* outputs) noexcept;
   void note_offsets() noexcept, note_corrected(bool has_jumped) noexcept;
