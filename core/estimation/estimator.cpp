@@ -246,8 +246,8 @@ double Estimator::judged_until(double time) const noexcept {
     const auto& [lag, newest] = deliveries_[s];
     const double interval = clocks_->usual_interval(static_cast<int>(s));
     if (!(lag > least_lag * interval) || std::isnan(newest)) continue;
-    const double wait = latest * interval + latest_lag * lag;
-    if (wait < longest && now < newest + wait) until = std::min(until, newest + soonest * interval);
+    const double next = newest + soonest * interval, missed = newest + latest * interval + latest_lag * lag;
+    if (missed - next < longest && now < missed) until = std::min(until, next);
   }
   return until;
 }
