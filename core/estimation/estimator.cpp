@@ -74,7 +74,6 @@ Estimator::Estimator(std::unique_ptr<EstimationMethod> method, const Timeline& t
       step_error_(method_->model()) {
   const Model& m = method_->model();
   clear_estimates();
-  clear_deliveries();
   input_.assign(m.input_count(), 0.0);
   measured_inputs_ = input_.size() - m.description().noisy_states.size();
   next_.assign(m.state_count(), 0.0);
@@ -328,12 +327,23 @@ std::size_t Estimator::merge_waiting(std::size_t row) noexcept {
   return row;
 }
 
+/// Whether something waits that is stamped up to a time.
+bool Estimator::has_waiting(double until) const noexcept {
+  return waiting_->size() > 0 && waiting_->time(0) <= until + timeline_.tolerance;
+}
+
+/// The judge goes on from an estimate at the newest node.
+void Estimator::estimate_for_judge(Clock::time_point deadline) noexcept {
+  method_->estimate(estimate_, deadline);
+  clip(estimate_);
+  watch_->follow(estimate_);
+}
+
 /// Judges what is stamped up to a time, in its order, and hands on what passes. False if the time was up before.
 bool Estimator::judge_waiting(double until, Clock::time_point deadline) noexcept {
   const double last = judged_until(until);
   bool is_new = false;
-  const auto has_next = [&] { return waiting_->size() > 0 && waiting_->time(0) <= last + timeline_.tolerance; };
-  for (; has_next(); is_new = true) {
+  for (; has_waiting(last); is_new = true) {
     if (is_new && is_past(deadline)) return false;
     const double time = waiting_->time(0);
     waiting_->drop_front(merge_waiting(0));
@@ -357,29 +367,21 @@ bool Estimator::judge_waiting(double until, Clock::time_point deadline) noexcept
       if (!is_complete) grid_.skip_to(time);
       rebase(watch_->mean(), watch_->covariance());
     }
-    if (watch_->is_active() || !has_next()) continue;
     // There is nothing to judge the next one by yet.
-    method_->estimate(estimate_, deadline);
-    clip(estimate_);
-    watch_->follow(estimate_);
+    if (!watch_->is_active() && has_waiting(last)) estimate_for_judge(deadline);
   }
-  const bool is_behind = waiting_->size() > 0 && waiting_->time(0) <= until + timeline_.tolerance;
-  if (is_new && is_behind && watch_->is_active()) {
+  if (is_new && has_waiting(until) && watch_->is_active()) {
     // The judge goes on from what the estimator says of the last sample that it has judged.
     if (goes_ahead()) grid_.outdate(watched_);
     const bool has_time = deadline == Clock::time_point::max() || Clock::now() + solving_ < deadline;
-    if (has_time && take_in(watched_, deadline) && !is_past(deadline)) {
-      method_->estimate(estimate_, deadline);
-      clip(estimate_);
-      watch_->follow(estimate_);
-    }
+    if (has_time && take_in(watched_, deadline) && !is_past(deadline)) estimate_for_judge(deadline);
   }
   return judge_ahead(until, deadline);
 }
 
 /// Uses what waits for late measurements, up to a time, as far as it passes its gates. False if the time was up before.
 bool Estimator::judge_ahead(double until, Clock::time_point deadline) noexcept {
-  if (waiting_->size() == 0 || waiting_->time(0) > until + timeline_.tolerance) return true;
+  if (!has_waiting(until)) return true;
   if (std::isnan(ahead_)) {
     watch_->begin_ahead();
     ahead_ = watched_;

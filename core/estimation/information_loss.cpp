@@ -117,6 +117,7 @@ void InformationLoss::update(const WalkingFilter& judge, Measured used) noexcept
   else
     ++samples_since_;
   if (!is_active_) return;
+  ++samples_above_;
   for (std::size_t j = 0; j < weights_.size(); ++j) weights_[j] = used.weight(static_cast<std::ptrdiff_t>(j));
   const auto take = [&](WalkingFilter& filter, auto&& counts) {
     copy_numbers(judge.mean(), filter.mean());
@@ -139,7 +140,7 @@ void InformationLoss::follow(const WalkingFilter& judge) noexcept {
 void InformationLoss::find_excess() noexcept {
   excess_ = log_volume(actual_.covariance(), factor_) - log_volume(complete_.covariance(), factor_);
   if (std::isnan(excess_)) excess_ = 0.0;  // of a parameter that is known
-  samples_above_ = excess_ > std::log(most_volume) ? samples_above_ + 1 : 0;
+  if (!(excess_ > std::log(most_volume))) samples_above_ = 0;
   if (samples_since_ > 0 && excess_ < as_good_as_equal) end();
 }
 

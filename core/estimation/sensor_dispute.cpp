@@ -183,7 +183,7 @@ void SensorWatch::confront(Hypothesis& hypothesis, const double* outputs, bool c
     return;
   }
   // Where a position is disputed, samples of a quick sensor that fails as well are not proof.
-  hypothesis.explained += counts && (memory_->is_beat || !is_place_disputed());
+  hypothesis.explained += counts && (memory_->is_counted || !is_place_disputed());
 }
 
 /// Whether a position has failed at its last sample.
@@ -499,7 +499,7 @@ void SensorWatch::test_inputs(const double* outputs) noexcept {
   trial.mean() = memory_->before_mean;
   trial.covariance() = memory_->before_covariance;
   trial.predict(input_.data(), memory_->duration);
-  trusted_samples_ = fits(trial, outputs) ? trusted_samples_ + memory_->is_beat : 0;
+  trusted_samples_ = fits(trial, outputs) ? trusted_samples_ + memory_->is_counted : 0;
   if (trusted_samples_ >= trusted_again) is_blind_ = false;
 }
 

@@ -281,8 +281,8 @@ bool SensorWatch::is_expected(std::size_t sensor) const noexcept {
 }
 
 /// Which sensors have come, or were to come. What is counted in samples counts those of the position, if there is one:
-/// a quick sensor beside it says little, however often. 1 of such a sample, 0 of another.
-int SensorWatch::note_sample(double time, const double* outputs) noexcept {
+/// a quick sensor beside it says little, however often.
+void SensorWatch::note_sample(double time, const double* outputs) noexcept {
   memory_->loss->note(time, outputs);
   bool has_position = false, is_position = false;
   for (std::size_t s = 0; s < sensors_.size(); ++s) {
@@ -290,14 +290,14 @@ int SensorWatch::note_sample(double time, const double* outputs) noexcept {
     has_position = true;
     is_position = is_position || is_expected(s);
   }
-  memory_->is_beat = is_position || !has_position;
-  return memory_->is_beat;
+  memory_->is_counted = is_position || !has_position;
 }
 
 SensorWatch::Finding SensorWatch::judge(double time, double* outputs, const double* weights) noexcept {
   memory_->has_advanced = false;
-  const int beat = note_sample(time, outputs);
-  if (memory_->since_release < std::numeric_limits<int>::max()) memory_->since_release += beat;
+  note_sample(time, outputs);
+  const int counted = memory_->is_counted;
+  if (memory_->since_release < std::numeric_limits<int>::max()) memory_->since_release += counted;
   std::fill(findings_.begin(), findings_.end(), 0u);
   held_count_ = is_disputed_ ? held_count_ : 0;
   Finding finding;
@@ -362,7 +362,7 @@ SensorWatch::Finding SensorWatch::judge(double time, double* outputs, const doub
       copy_numbers(filter.mean(), memory_->before_update);
       filter.update_as_expected(weighed(outputs));
       double& beyond = memory_->beyond_bounds;
-      beyond += Memory::slip_beyond_bounds(filter, memory_->before_update, setup_.noise) - beat * usually_beyond;
+      beyond += Memory::slip_beyond_bounds(filter, memory_->before_update, setup_.noise) - counted * usually_beyond;
       beyond = std::min(std::max(beyond, 0.0), 2.0 * impossibly_beyond);
       if (beyond > impossibly_beyond) {
         input_findings_ |= reason::implausible;
@@ -416,7 +416,7 @@ SensorWatch::Finding SensorWatch::judge(double time, double* outputs, const doub
   bool is_calm = input_findings_ == 0;
   const bool is_open = is_probably_slip();
   memory_->was_open = is_open;
-  memory_->undisputed_samples = is_disputed_ ? 0 : std::min(memory_->undisputed_samples + beat, setup_.calm);
+  memory_->undisputed_samples = is_disputed_ ? 0 : std::min(memory_->undisputed_samples + counted, setup_.calm);
   for (std::size_t s = 0; s < sensors_.size(); ++s) {
     if (is_open && findings_[s] == reason::rejected) continue;
     is_calm = is_calm && findings_[s] == 0;
@@ -426,7 +426,7 @@ SensorWatch::Finding SensorWatch::judge(double time, double* outputs, const doub
     const int calm = has_moved && !memory_->was_return ? setup_.calm_after_moving : setup_.calm;
     if (quiet_[s] >= calm) states_[s].reasons = 0;
   }
-  calm_samples_ = is_calm ? calm_samples_ + beat : 0;
+  calm_samples_ = is_calm ? calm_samples_ + counted : 0;
   if (input_findings_) inputs_.reasons = input_findings_;
   if (calm_samples_ >= setup_.calm) inputs_.reasons = 0;
   input_findings_ = 0;

@@ -6,7 +6,6 @@
 #include <cstdint>
 #include <limits>
 #include <memory>
-#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
@@ -17,7 +16,6 @@
 #include "numbers.hpp"
 #include "offset_watch.hpp"
 #include "past_places.hpp"
-#include "rhec/core/base/with_size.hpp"
 #include "rhec/core/estimation/sensor_watch.hpp"
 #include "stuck_values.hpp"
 #include "walking_filter.hpp"
@@ -129,16 +127,16 @@ struct SensorWatch::Memory {
   bool was_calm = true;        ///< health was ok when the dispute began, and there had been none for some time
   bool was_open = false;       ///< what was disputed at the last sample was probably slip, and nothing was said of it
   int undisputed_samples = 0;  ///< in a row
-  bool is_beat = true;         ///< of samples, those count that have a position, or were to have one
+  bool is_counted = true;      ///< the last sample has a position, or was to have one; true where there are none
   std::array<double, 2> jumps{};                        ///< behind which slip has been made anew for what is disputed
   int jump_count = 0;                                   ///< of these
-  int since_release = std::numeric_limits<int>::max();  ///< beats since slip was found to have jumped
+  int since_release = std::numeric_limits<int>::max();  ///< such samples since slip was found to have jumped
   double disputed_from = unknown;                       ///< behind this time what is disputed was measured
   Retraction released{unknown, unknown, nullptr};       ///< what would have to be taken back of that
   std::vector<double> retracted;                        ///< n_y, not missing of outputs that were wrong then
   MeasuredOutputs replayed;                             ///< what counts of a sample that is replayed
-  double slip_beyond =
-      0.0;  ///< how far slip that explains what is disputed is beyond its bounds, in its standard deviations
+  /// How far slip that explains what is disputed is beyond its bounds, in its standard deviations.
+  double slip_beyond = 0.0;
   StuckValues stuck;
   std::unique_ptr<OffsetWatch> offsets;
   std::unique_ptr<InformationLoss> loss;

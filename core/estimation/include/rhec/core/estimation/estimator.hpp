@@ -109,6 +109,8 @@ class RHEC_EXPORT Estimator {
   void note_delivery(double time, Measured outputs) noexcept;
   double judged_until(double time) const noexcept;
   std::size_t merge_waiting(std::size_t row) noexcept;
+  bool has_waiting(double until) const noexcept;
+  void estimate_for_judge(Clock::time_point deadline) noexcept;
   bool judge_waiting(double until, Clock::time_point deadline) noexcept;
   bool judge_ahead(double until, Clock::time_point deadline) noexcept;
   /// Whether measurements are used that are not judged yet.

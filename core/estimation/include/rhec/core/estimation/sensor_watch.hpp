@@ -131,10 +131,10 @@ class RHEC_EXPORT SensorWatch {
   bool admits(std::size_t sensor, const Innovation& innovation) noexcept;
   bool is_still_off(const Record& record, const Innovation& innovation) const noexcept;
   Measured weighed(const double* outputs) const noexcept;
-  void find_stuck(double* outputs) noexcept;
+  void find_stuck(double*outputs) noexcept, note_sample(double time, const double*outputs) noexcept;
   void note_motion(double duration, const double* inputs) noexcept;
   bool is_searching() const noexcept, is_expected(std::size_t sensor) const noexcept;
-  int offset_in_dispute() noexcept, note_sample(double time, const double*outputs) noexcept;
+  int offset_in_dispute() noexcept;
   void start_search(const double* outputs) noexcept;
   void search_from(WalkingFilter& filter, HeadingSearch& search) noexcept;
   void think_again() noexcept;
