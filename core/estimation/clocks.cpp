@@ -14,7 +14,7 @@ constexpr double usual_intervals = 10.0;
 constexpr int confirm_gap = 2, confirm_clock = 3;
 // Going through known times again shows only if it lasts: single stamps are late for other reasons.
 constexpr int confirm_repetition = 4;
-constexpr double adaptation = 0.1;  // of the usual interval to a new one
+constexpr double same_interval = 0.25;  // relative difference of two that are alike
 
 }  // namespace
 
@@ -26,24 +26,29 @@ void Clocks::reset() noexcept {
   for (Source& source : sources_) {
     source = {};
     source.newest = unknown;
-    source.usual = setup_.usual_interval;
   }
 }
 
+double Clocks::usual_interval(const Source& source) const noexcept {
+  const double interval = source.rhythm.interval();
+  return std::isnan(interval) ? setup_.usual_interval : interval;
+}
+
 double Clocks::room_ahead(const Source& source) const noexcept {
-  return std::max(usual_room, usual_intervals * source.usual);
+  return std::max(usual_room, usual_intervals * usual_interval(source));
 }
 
 Clocks::Place Clocks::place(const Source& source, double time) const noexcept {
   if (std::isnan(now_)) return Place::in_order;
   if (time > now_ + room_ahead(source)) return Place::far_ahead;
   if (time < now_ - setup_.behind) return Place::far_behind;
-  if (std::isnan(source.newest) || time >= source.newest - 0.5 * source.usual) return Place::in_order;
+  const double usual = usual_interval(source);
+  if (std::isnan(source.newest) || time >= source.newest - 0.5 * usual) return Place::in_order;
   // Has the source delivered what lies between this time and its newest?
-  const double expected = (source.newest - time) / source.usual;
+  const double expected = (source.newest - time) / usual;
   const std::size_t known = std::min(source.count, remembered);
   const auto later = std::count_if(source.times.begin(), source.times.begin() + static_cast<std::ptrdiff_t>(known),
-                                   [&](double other) { return other > time + 0.25 * source.usual; });
+                                   [&](double other) { return other > time + 0.25 * usual; });
   const bool is_known = static_cast<double>(later) >= 0.5 * std::min(expected, static_cast<double>(remembered));
   return is_known && is_within(source, time) ? Place::repeated : Place::late;
 }
@@ -67,8 +72,7 @@ bool Clocks::is_within(const Source& source, double time) noexcept {
 
 double Clocks::use(Source& source, double time) noexcept {
   if (!(source.newest >= time)) {
-    const double interval = time - source.newest;
-    if (interval > 0.0 && interval < room_ahead(source)) source.usual += adaptation * (interval - source.usual);
+    source.rhythm.hear(time);
     source.newest = time;
   }
   source.times[source.count++ % remembered] = time;
@@ -76,10 +80,14 @@ double Clocks::use(Source& source, double time) noexcept {
   return time;
 }
 
+/// Of a source that is slow, or has become so, intervals are long, but alike.
 void Clocks::suspect(Source& source, double stamp) noexcept {
   const double interval = stamp - source.last_suspect;
-  const bool follows = source.suspects > 0 && interval > 0.0 && interval < room_ahead(source);
+  const bool is_alike = std::abs(interval - source.suspect_interval) < same_interval * interval;
+  const bool is_slow = interval <= setup_.longest_gap && (is_alike || std::isnan(source.rhythm.interval()));
+  const bool follows = source.suspects > 0 && interval > 0.0 && (interval < room_ahead(source) || is_slow);
   if (!follows) source.first_suspect = stamp;
+  source.suspect_interval = source.suspects > 0 ? interval : 0.0;
   source.suspects = follows ? source.suspects + 1 : 1;
   source.last_suspect = stamp;
 }
@@ -87,7 +95,7 @@ void Clocks::suspect(Source& source, double stamp) noexcept {
 /// The first stamp by the new clock is an interval after the newest by the old one.
 double Clocks::set_clock(Source& source, double stamp) noexcept {
   const double last = std::isnan(source.newest) ? now_ : source.newest;
-  source.offset = source.first_suspect - (last + source.usual);
+  source.offset = source.first_suspect - (last + usual_interval(source));
   source.suspects = 0;
   ++settings_;
   return use(source, stamp - source.offset);

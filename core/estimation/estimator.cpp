@@ -18,9 +18,10 @@ constexpr int checked_interval = 16;  // of so many, the integration of one is c
 constexpr int most_parts = 1000;      // largest number of parts of one prediction
 // Parts of the rest of a prediction whose time is up.
 constexpr int hasty_parts = 2;
-// A source is overdue after so many of its usual intervals.
-constexpr double overdue = 1.75;
-constexpr int most_steps = 32;  // of such a part, times those of a usual one
+// A source is overdue this share of its usual interval after its message was to come.
+constexpr double overdue = 0.75;
+constexpr double age_memory = 5.0;  // the usual age of a source's newest message is a mean over so many
+constexpr int most_steps = 32;      // of such a part, times those of a usual one
 // A sensor's next measurement is not before this share of its usual interval, and has come after that share, and after
 // so many times that it is usually late.
 constexpr double soonest = 0.75, latest = 1.25, latest_lag = 2.0;
@@ -100,13 +101,17 @@ Estimator::Estimator(std::unique_ptr<EstimationMethod> method, const Timeline& t
     sigmas_.push_back(std::sqrt(watch_->setup().noise.output_variances[j]));
   presence_.assign(sensors, SensorWatch::Presence::present);
   deliveries_.resize(sensors);
+  ages_.resize(sensors + 1);
   input_sigmas_.assign(input_.size(), 0.0);
+  held_inputs_.resize(measured_inputs_);
   clear_deliveries();
   for (Estimate* e : {&estimate_, &predicted_}) assess(*e, 0.0);
 }
 
 void Estimator::clear_deliveries() noexcept {
   std::ranges::fill(deliveries_, Delivery{0.0, missing_value});
+  std::ranges::fill(held_inputs_, HeldInput{missing_value, missing_value});
+  std::ranges::fill(ages_, Age{missing_value, 0.0, 0.0});
   newest_row_ = ahead_ = missing_value;
   used_ = -infinity;
 }
@@ -274,11 +279,30 @@ void Estimator::push_judged(double time, Measured outputs, bool may_be_used) noe
 }
 
 void Estimator::push_input(double time, const double* inputs) noexcept {
-  if (watch_) time = place_on_timeline(time, inputs_source());
-  if (!std::isfinite(time)) return;
   for (std::size_t j = 0; j < measured_inputs_; ++j) values_[j] = cleaned(inputs[j]);
-  if (watch_) watch_->clean_inputs(values_.data());
+  if (watch_) {
+    watch_->clean_inputs(values_.data());
+    const auto end = values_.begin() + static_cast<std::ptrdiff_t>(measured_inputs_);
+    // A message that says nothing is none: what was said before holds.
+    if (std::all_of(values_.begin(), end, [](double value) { return std::isnan(value); })) return;
+    time = place_on_timeline(time, inputs_source());
+  }
+  if (!std::isfinite(time)) return;
+  if (watch_) hold_missing_inputs(time);
   grid_.push_input(time, values_.data());
+}
+
+/// What is missing of a message of inputs holds for as long as it would if no message came.
+void Estimator::hold_missing_inputs(double time) noexcept {
+  const double longest = longest_silence(inputs_source());
+  for (std::size_t j = 0; j < measured_inputs_; ++j) {
+    HeldInput& held = held_inputs_[j];
+    const double age = time - held.time;
+    if (!std::isnan(values_[j]))
+      held = age < 0.0 ? held : HeldInput{values_[j], time};
+    else if (age >= 0.0 && age <= longest)
+      values_[j] = held.value;
+  }
 }
 
 /// Makes the nodes of all that is stamped up to a time, those anew that it has changed. False if the time was up
@@ -429,7 +453,8 @@ SensorWatch::Finding Estimator::judge(double time, MeasuredOutputs& outputs, Clo
 
 /// After so long without a word a source is silent [s].
 double Estimator::longest_silence(int source) const noexcept {
-  constexpr double least_silence = 1.0, usual_intervals = 5.0;
+  constexpr double least_silence = 1.0, usual_intervals = 5.0, slow = 1.0;
+  if (!clocks_->knows_interval(source)) return usual_intervals * slow;
   return std::max(least_silence, usual_intervals * clocks_->usual_interval(source));
 }
 
@@ -470,23 +495,40 @@ void Estimator::guess_input(double since, double begin, double end) noexcept {
   }
 }
 
+/// Learns how old messages are before the next one of their source can be used: by its interval, and by how late it is.
+void Estimator::note_ages(double time) noexcept {
+  for (std::size_t s = 0; s < ages_.size(); ++s) {
+    const int source = static_cast<int>(s);
+    Age& age = ages_[s];
+    const double newest = clocks_->newest(source);
+    if (std::isnan(newest)) continue;
+    if (newest > age.newest)
+      age.usual += (std::min(age.last, age.usual + clocks_->usual_interval(source)) - age.usual) / age_memory;
+    age.newest = newest;
+    age.last = std::max(0.0, time - newest);
+  }
+}
+
+SensorWatch::Presence Estimator::presence(int source, double time) const noexcept {
+  if (!has_started()) return SensorWatch::Presence::present;
+  const double interval = clocks_->usual_interval(source);
+  const double beyond =
+      time - clocks_->newest(source) - std::max(ages_[static_cast<std::size_t>(source)].usual, interval);
+  if (beyond > longest_silence(source) - interval) return SensorWatch::Presence::silent;
+  return beyond > overdue * interval ? SensorWatch::Presence::overdue : SensorWatch::Presence::present;
+}
+
 void Estimator::assess(Estimate& estimate, double time) noexcept {
   if (!watch_) return;
   const bool is_estimated = estimate.covariance.size() > 0 && estimate.covariance.diagonal().maxCoeff() > 0.0;
   std::uint32_t reasons = !has_started() || (is_estimated && !watch_->is_active()) ? reason::starting : 0;
   for (std::size_t s = 0; s < presence_.size(); ++s) {
-    const int source = static_cast<int>(s);
-    // One that is usually late is not missed before.
-    const double silence = has_started() ? time - clocks_->newest(source) - deliveries_[s].lag : 0.0;
-    presence_[s] = silence > longest_silence(source)                     ? SensorWatch::Presence::silent
-                   : silence > overdue * clocks_->usual_interval(source) ? SensorWatch::Presence::overdue
-                                                                         : SensorWatch::Presence::present;
-    if (clocks_->is_suspected(source)) reasons |= reason::clock;
+    presence_[s] = presence(static_cast<int>(s), time);
+    if (clocks_->is_suspected(static_cast<int>(s))) reasons |= reason::clock;
   }
   if (clocks_->is_suspected(inputs_source())) reasons |= reason::clock;
-  const double input_age = has_started() ? time - clocks_->newest(inputs_source()) : 0.0;
-  watch_->assess(estimate, presence_, input_age > overdue * clocks_->usual_interval(inputs_source()), reasons,
-                 estimate.health);
+  const bool are_inputs_overdue = presence(inputs_source(), time) != SensorWatch::Presence::present;
+  watch_->assess(estimate, presence_, are_inputs_overdue, reasons, estimate.health);
 }
 
 /// What leads beyond a bound, as a steering angle beyond its stop, ends there.
@@ -570,6 +612,7 @@ const Estimate& Estimator::estimate(double time, Clock::time_point deadline) noe
     time -= clock_offset;
     is_all_judged = judge_waiting(time, extended(0.5, before_solving));
   }
+  if (watch_ && std::isfinite(time)) note_ages(time);
   if (has_started() || !std::isnan(time))
     is_all_taken_in =
         take_in(has_started() && !(time > grid_.time()) ? grid_.time() : time, extended(1.0, before_solving));

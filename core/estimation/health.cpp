@@ -48,8 +48,7 @@ std::string in_words(const Health& health, const std::vector<Sensor>& sensors) {
     std::string words;
     for (const std::uint32_t each : reason::all)
       if (reasons & each)
-        words += fmt::format("{}{}{}", words.empty() ? "" : " and ", name_of_reason(each),
-                             each == reason::off ? offset : "");
+        words += fmt::format("{}{}", words.empty() ? "" : " and ", each == reason::off ? offset : name_of_reason(each));
     if (words.empty()) return;
     text += fmt::format("{}{}{}{}", separator, who, who.empty() ? "" : " ", words);
     separator = "; ";
@@ -57,7 +56,8 @@ std::string in_words(const Health& health, const std::vector<Sensor>& sensors) {
   add("", health.reasons);
   for (std::size_t s = 0; s < health.sensors.size(); ++s) {
     const SensorHealth& sensor = health.sensors[s];
-    std::string offset = fmt::format(" by about {:.2g} {}", sensor.offset, sensors[s].unit);
+    std::string offset =
+        sensor.offset == 0.0 ? "was off" : fmt::format("off by about {:.2g} {}", sensor.offset, sensors[s].unit);
     if (sensor.rival >= 0) offset += " from " + sensors[static_cast<std::size_t>(sensor.rival)].name;
     add(sensors[s].name, sensor.reasons, offset);
   }

@@ -11,39 +11,27 @@ namespace rhec {
 namespace {
 
 constexpr double none = std::numeric_limits<double>::quiet_NaN();
-constexpr double gap = 1.5;                                 // an interval that is longer than so many usual ones is one
-constexpr double to_new_interval = 0.1, most_of_old = 2.0;  // a gap changes the usual interval by little
-constexpr double jitter = 0.05;                             // of an interval, at least
-constexpr double deviations = 4.0;                          // by which a sample is later than usual that does not come
-constexpr double as_good_as_equal = 0.05;                   // of the logarithm of a volume
-
-/// Takes an interval between two times of a sequence into the usual one.
-void note_interval(double interval, double& usual) noexcept {
-  if (!(interval > 0.0)) return;
-  if (std::isnan(usual))
-    usual = interval;
-  else
-    usual += to_new_interval * (std::min(interval, most_of_old * usual) - usual);
-}
+constexpr double gap = 1.5;                // an interval that is longer than so many usual ones is one
+constexpr double jitter = 0.05;            // of an interval between samples, at least
+constexpr double early = 1e-3;             // of its interval: no output is missed before
+constexpr double deviations = 4.0;         // by which a sample is later than usual that does not come
+constexpr int most_missed = 16;            // samples that have not come of one prediction
+constexpr double as_good_as_equal = 0.05;  // of the logarithm of a volume
 
 }  // namespace
 
-bool InformationLoss::Rhythm::is_due(double time) const noexcept {
-  return time - counted > (1.0 - jitter) * interval + deviations * deviation;
-}
-
-void InformationLoss::Rhythm::hear(double time) noexcept {
-  const double last = time - heard;
-  if (last > 0.0 && !std::isnan(interval))
-    deviation += to_new_interval * (std::min(std::abs(last - interval), interval) - deviation);
-  note_interval(last, interval);
-  heard = counted = time;
+/// Whether a sample of the output was to come up to a time; it counts then.
+bool InformationLoss::Expected::was_due(double time) noexcept {
+  const double interval = rhythm.interval();
+  if (!(time - counted > (1.0 - early) * interval + deviations * rhythm.deviation())) return false;
+  counted = time - counted > 2.0 * interval ? time : counted + interval;
+  return true;
 }
 
 InformationLoss::InformationLoss(const std::shared_ptr<const Model>& model, const WalkingFilter::Setup& setup)
     : actual_(model, setup), complete_(model, setup) {
   const auto ny = static_cast<std::size_t>(model->output_count());
-  rhythms_.assign(ny, {});
+  outputs_.assign(ny, {});
   expected_.assign(ny, false);
   values_.assign(ny, none);
   weights_.assign(ny, 1.0);
@@ -52,8 +40,8 @@ InformationLoss::InformationLoss(const std::shared_ptr<const Model>& model, cons
 }
 
 void InformationLoss::reset() noexcept {
-  std::ranges::fill(rhythms_, Rhythm{none, 0.0, none, none});
-  interval_ = last_ = none;
+  std::ranges::fill(outputs_, Expected{{}, none});
+  samples_.reset();
   since_last_ = 0.0;
   missed_ = 0;
   end();
@@ -75,15 +63,16 @@ void InformationLoss::begin(const WalkingFilter& judge) noexcept {
 
 void InformationLoss::predict(const WalkingFilter& judge, const double* inputs, double duration,
                               const double* more_sigmas) noexcept {
-  if (more_sigmas || since_last_ + duration > gap * interval_) begin(judge);
+  if (more_sigmas || since_last_ + duration > gap * samples_.interval()) begin(judge);
   if (is_active_) {
     copy_numbers(judge.mean(), actual_.mean());
     copy_numbers(judge.mean(), complete_.mean());
-    if (since_last_ > (missed_ + 1.0 - jitter) * interval_) {
+    for (int i = 0; i < most_missed && since_last_ > (missed_ + 1.0 - jitter) * samples_.interval(); ++i) {
       ++missed_;
       complete_.expect();
       for (std::size_t j = 0; j < values_.size(); ++j)
-        values_[j] = std::isnan(rhythms_[j].interval) ? none : complete_.expected(static_cast<int>(j));
+        values_[j] =
+            outputs_[j].was_due(samples_.last() + since_last_) ? complete_.expected(static_cast<int>(j)) : none;
       complete_.update_as_expected(values_.data());
     }
     actual_.predict(inputs, duration, more_sigmas);
@@ -93,18 +82,16 @@ void InformationLoss::predict(const WalkingFilter& judge, const double* inputs, 
 }
 
 void InformationLoss::note(double time, const double* measured) noexcept {
-  note_interval(time - last_, interval_);
-  last_ = time;
+  samples_.hear(time);
   since_last_ = 0.0;
   missed_ = 0;
-  for (std::size_t j = 0; j < rhythms_.size(); ++j) {
-    Rhythm& rhythm = rhythms_[j];
-    const bool has_come = !std::isnan(measured[j]), was_due = !has_come && rhythm.is_due(time);
-    if (has_come)
-      rhythm.hear(time);
-    else if (was_due)
-      rhythm.counted = time - rhythm.counted > 2.0 * rhythm.interval ? time : rhythm.counted + rhythm.interval;
-    expected_[j] = has_come || was_due;
+  for (std::size_t j = 0; j < outputs_.size(); ++j) {
+    auto& [rhythm, counted] = outputs_[j];
+    const bool has_come = !std::isnan(measured[j]);
+    expected_[j] = has_come || outputs_[j].was_due(time);
+    if (!has_come) continue;
+    rhythm.hear(time);
+    counted = time;
   }
 }
 

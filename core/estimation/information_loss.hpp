@@ -3,6 +3,7 @@
 #include <memory>
 #include <vector>
 
+#include "rhec/core/estimation/rhythm.hpp"
 #include "walking_filter.hpp"
 
 namespace rhec {
@@ -31,6 +32,11 @@ class InformationLoss {
   void note(double time, const double* measured) noexcept;
   /// Whether an output has come with it, or was to come.
   bool is_expected(int output) const noexcept { return expected_[static_cast<std::size_t>(output)]; }
+  /// Usual intervals of samples, and of those of an output [s]; NaN: not known.
+  double usual_interval() const noexcept { return samples_.interval(); }
+  double usual_interval(int output) const noexcept {
+    return outputs_[static_cast<std::size_t>(output)].rhythm.interval();
+  }
 
   /// From the judge's moments before `duration` [s] with an input (n_u). `more_sigmas` (n_u, or null) as in
   /// SensorWatch::advance: nobody has said what the input is.
@@ -41,22 +47,21 @@ class InformationLoss {
   void follow(const WalkingFilter& judge) noexcept;
 
  private:
-  /// Of an output [s]; NaN: none.
-  struct Rhythm {
-    double interval, deviation;  ///< usual one, and by how much one differs from that, on average
-    double heard, counted;       ///< times of its last sample, and of the last one that came or was to come
-    bool is_due(double time) const noexcept;
-    void hear(double time) noexcept;
+  /// Of an output.
+  struct Expected {
+    Rhythm rhythm;
+    double counted;  ///< time of its last sample that came or was to come [s]; NaN: none
+    bool was_due(double time) noexcept;
   };
   void begin(const WalkingFilter& judge) noexcept;
   void find_excess() noexcept;
 
   WalkingFilter actual_, complete_;
-  std::vector<Rhythm> rhythms_;           ///< n_y
+  std::vector<Expected> outputs_;         ///< n_y
   std::vector<bool> expected_;            ///< n_y, of the last sample
   std::vector<double> values_, weights_;  ///< n_y, what counts of it
-  double interval_, last_;                ///< usual one between samples, and the time of the last one [s]; NaN: none
-  double since_last_ = 0.0;               ///< [s]
+  Rhythm samples_;
+  double since_last_ = 0.0;  ///< [s]
   double excess_ = 0.0;
   Eigen::MatrixXd factor_;  ///< of a covariance
   int missed_ = 0;          ///< samples since the last one that have not come

@@ -5,13 +5,14 @@
 #include <utility>
 
 #include "innovation.hpp"
+#include "rhec/core/base/infinity.hpp"
 
 namespace rhec {
 
 namespace {
 
 // An onset begins where an innovation is larger than so many standard deviations, or none is younger than so many
-// samples. Where there are many, one of at least so many samples gives way; the oldest say nothing new.
+// samples that count. Where there are many, one of at least so many samples gives way; the oldest say nothing new.
 constexpr double strange = 2.0;
 constexpr int most_onsets = 7, young = 20, unproven = 10, oldest = 150;
 // The difference of two outputs shows at once: so many onsets of it are enough.
@@ -29,6 +30,9 @@ constexpr double negligible = 2.0;
 // By no more than so many is one known that innovations have said: slip makes some that look like one, too, and later
 // ones have to be able to say so.
 constexpr double most_certain = 4.0;
+// In typical magnitudes of an output, what it is not off by: where an offset hardly shows, anything would explain a
+// little.
+constexpr double impossible_offset = 10.0;
 
 /// P + v v' scale, without a temporary.
 template <class Vector>
@@ -59,6 +63,10 @@ OffsetWatch::OffsetWatch(const Model& model, const std::vector<Watched>& outputs
     first_slot_.push_back(is_single ? first_shared : slots);
     slots_.push_back(is_single ? most_onsets : onsets_of_rivals);
     if (!is_single) slots += onsets_of_rivals;
+  }
+  for (const Watched& each : outputs) {
+    const Variable& about = model.description().outputs[static_cast<std::size_t>(each.output)];
+    most_offset_.push_back(each.rival >= 0 ? infinity : impossible_offset * about.scale);
   }
   onsets_.resize(slots);
   const Eigen::Index n = model.state_count() + model.parameter_count(), needed = lane_of_known(outputs_.size()),
@@ -220,10 +228,10 @@ void OffsetWatch::widen_by_candidate(const WalkingFilter& filter, const Sensor& 
 }
 
 /// One output after the other, as the filter has done it: innovations of a sample are then independent.
-void OffsetWatch::take(const WalkingFilter& filter, double excess) noexcept {
+void OffsetWatch::take(const WalkingFilter& filter, double excess, bool counts) noexcept {
   if (outputs_.empty()) return;
   const double kept = 1.0 - 1.0 / memory;
-  for (std::size_t k = 0; k < outputs_.size(); ++k) {
+  for (std::size_t k = 0; counts && k < outputs_.size(); ++k) {
     const int ever = static_cast<int>(k);
     const Constant all = constant(ever);
     set(ever, {kept * all.information, kept * all.score, kept * all.squares, kept * all.count});
@@ -238,7 +246,7 @@ void OffsetWatch::take(const WalkingFilter& filter, double excess) noexcept {
   suspect_ = refuted_ = candidate_ = -1;
   for (std::size_t k = 0; k < known_.size(); ++k) {
     Known& known = known_[k];
-    ++known.age;
+    known.age += counts;
     if (!known.is_off) continue;
     if (!is_significant(k)) refuted_ = static_cast<int>(k);
     if (rivals_[k] < 0) continue;
@@ -249,14 +257,15 @@ void OffsetWatch::take(const WalkingFilter& filter, double excess) noexcept {
   for (std::size_t m = 0; m < onsets_.size(); ++m) {
     Onset& each = onsets_[m];
     if (each.watched < 0) continue;
-    ++each.age;
+    each.age += counts;
     // What an offset does is in the excess, too, but not before it began.
     const double usual = m < outputs_.size() ? excess : std::min(excess, each.excess);
     const int lane = static_cast<int>(m);
     // None is more significant than what it explains.
     if (!(score_[lane] * score_[lane] > most * usual * information_[lane])) continue;
-    const double significance = constant(lane).significance() / usual;
-    if (!(significance > most)) continue;
+    const Constant found = constant(lane);
+    const double significance = found.significance() / usual;
+    if (!(significance > most) || !is_possible(each.watched, found.value())) continue;
     most = significance;
     candidate_ = lane;
   }
@@ -264,6 +273,11 @@ void OffsetWatch::take(const WalkingFilter& filter, double excess) noexcept {
   const bool is_measured = filter.use(outputs_[onsets_[candidate_].watched]).variance > 0.0;
   if (is_measured && most > limit_) suspect_ = candidate_;
   probability_ = 1.0 / (1.0 + std::exp(0.5 * (even_odds - most)));
+}
+
+bool OffsetWatch::is_possible(int watched, double change) const noexcept {
+  const auto k = static_cast<std::size_t>(watched);
+  return std::abs(known_[k].value + change) <= most_offset_[k];
 }
 
 void OffsetWatch::adopt_suspected(WalkingFilter& filter) noexcept {

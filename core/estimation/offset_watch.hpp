@@ -47,8 +47,8 @@ class OffsetWatch {
   void widen_by_candidate(const WalkingFilter& filter, const Sensor& sensor, const double* outputs,
                           Innovation& innovation) const noexcept;
   /// What the filter has just used of the outputs. `excess`: squares of innovations have been so many times what was
-  /// expected.
-  void take(const WalkingFilter& filter, double excess) noexcept;
+  /// expected. `counts`: the sample is one of those in which time is counted.
+  void take(const WalkingFilter& filter, double excess, bool counts = true) noexcept;
   /// Whether innovations say that an output is off, or has come back.
   bool has_suspect() const noexcept { return suspect_ >= 0 || refuted_ >= 0; }
   /// Adopts that offset; the filter becomes what it would be without it.
@@ -101,13 +101,13 @@ class OffsetWatch {
   };
   struct Onset {
     int watched = -1;     ///< -1: none
-    int age = 0;          ///< [samples]
+    int age = 0;          ///< [samples that count]
     double excess = 1.0;  ///< of innovations when it began
   };
   struct Known {
     bool is_recent() const noexcept;
     bool is_off = false;
-    int age = 0;  ///< [samples]
+    int age = 0;  ///< [samples that count]
     double value = 0.0;
     double by_x = 0.0, by_y = 0.0;  ///< derivatives of the output by the position
   };
@@ -123,6 +123,7 @@ class OffsetWatch {
   void widen_by(const WalkingFilter& filter, const Sensor& sensor, const double* outputs, int output, int lane,
                 Innovation& innovation) const noexcept;
   bool is_significant(std::size_t watched) const noexcept;
+  bool is_possible(int watched, double change) const noexcept;
   void withdraw(std::size_t watched, WalkingFilter& filter) noexcept;
   void find_used_lanes() noexcept;
   void clip(Eigen::VectorXd::SegmentReturnType parameters) const noexcept;
@@ -130,6 +131,7 @@ class OffsetWatch {
   std::vector<int> outputs_, rivals_;    ///< that are watched
   std::vector<int> first_slot_, slots_;  ///< by watched output, its places for onsets
   std::vector<int> watched_of_;          ///< by output, which of these it is; -1: none
+  std::vector<double> most_offset_;      ///< by watched output
   int position_x_, position_y_;          ///< states
   std::vector<double> parameter_lower_, parameter_upper_;
   double limit_;

@@ -73,8 +73,8 @@ bool PriorBank::is_of_motion(int output) const noexcept {
 /// (Mehra 1970). R follows by a scalar Kalman filter in units of itself, whose own variance V says how well R is known;
 /// where S tells little about R, R hardly moves. What was used in its place, with what is not known of it and with
 /// variances of second-order terms, makes i larger, and of S a part that is not R. Residuals are those of the most
-/// probable member. Outputs of one unit and one stated noise, like the coordinates of a position, are one sensor and
-/// change together.
+/// probable member. The coordinates of a position are one sensor and change
+/// together.
 ///
 /// Of an output of motion, what nodes measure does not count: the interval is linearised where they put it. That makes
 /// innovations smaller than S says, and little of S is R.

@@ -127,7 +127,7 @@ bool SensorWatch::is_placed_by_other(int position) const noexcept {
   const double now = heard_[static_cast<std::size_t>(position)];
   for (std::size_t s = 0; s < sensors_.size(); ++s)
     if (static_cast<int>(s) != position && sees_position(sensors_[s].outputs) && records_[s].failures == 0 &&
-        now - heard_[s] <= Memory::longest_gap)
+        !std::isnan(heard_[s]) && !is_silent(s, now))
       return true;
   return false;
 }

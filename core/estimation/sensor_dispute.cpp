@@ -220,14 +220,14 @@ bool SensorWatch::is_placed_otherwise() const noexcept {
   return unplaced_samples_ < std::min(disputed_samples_, setup_.proof);
 }
 
-/// A disputed position can be followed only if nothing else says where the vehicle is.
+/// A disputed position can be followed only if nothing else says where the vehicle is, and any other sensor only if
+/// nothing else is measured, in this sample or lately.
 bool SensorWatch::may_follow() const noexcept {
   if (is_placed_otherwise()) return false;
   if (is_position_disputed()) return true;
   for (std::size_t s = 0; s < sensors_.size(); ++s) {
-    const bool is_disputed = (findings_[s] & reason::rejected) != 0;
-    if (!is_disputed && std::ranges::any_of(sensors_[s].outputs, [&](int j) { return !std::isnan(raw_[j]); }))
-      return false;
+    const bool is_doubted = (findings_[s] & reason::rejected) != 0 || records_[s].failures > 0;
+    if (!is_doubted && !std::isnan(heard_[s]) && !is_silent(s, memory_->now)) return false;
   }
   return true;
 }
@@ -306,8 +306,9 @@ void SensorWatch::consider_moved(double likelihood_of_new_slip) noexcept {
   // As probable before the sample as that slip has jumped.
   if (slip_->is_active && !std::isnan(likelihood_of_new_slip))
     slip_probability_ = 1.0 / (1.0 + std::exp(likelihood(moved_->filter, true) - likelihood_of_new_slip));
-  // Whether the other sensors agree better with a vehicle whose state is what the disputed one says.
-  if (!is_new && !is_position_disputed())
+  // Whether the other sensors agree better with a vehicle whose state is what the disputed one says: the position, if
+  // there is one, for errors of a quick compass or gyro are the same from sample to sample.
+  if (!is_new && !is_position_disputed() && memory_->is_counted)
     moved_->evidence += likelihood(moved_->filter, false) - likelihood(own_->filter, false);
   confront(*moved_, raw_.data(), true);
 }

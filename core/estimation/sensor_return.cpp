@@ -19,15 +19,12 @@ constexpr double considerable = 3.0;
 
 }  // namespace
 
-/// The one disputed sensor that sees the position; -1 if there are none or several.
+/// The first disputed sensor that sees the position; -1: none. Several that fail together have moved alike, as
+/// receivers do whose base station has.
 int SensorWatch::disputed_position() const noexcept {
-  int found = -1;
-  for (std::size_t s = 0; s < sensors_.size(); ++s) {
-    if (!(findings_[s] & reason::rejected) || !sees_position(sensors_[s].outputs)) continue;
-    if (found >= 0) return -1;
-    found = static_cast<int>(s);
-  }
-  return found;
+  for (std::size_t s = 0; s < sensors_.size(); ++s)
+    if ((findings_[s] & reason::rejected) && sees_position(sensors_[s].outputs)) return static_cast<int>(s);
+  return -1;
 }
 
 /// Before what has moved is made anew: by how much it has, from where the estimate expects it or, if it has jumped

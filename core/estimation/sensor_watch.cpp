@@ -280,9 +280,15 @@ bool SensorWatch::is_expected(std::size_t sensor) const noexcept {
   return std::ranges::any_of(sensors_[sensor].outputs, [&](int j) { return memory_->loss->is_expected(j); });
 }
 
+/// Whether a sensor has said nothing for long, up to a time; one that has never been heard has not.
+bool SensorWatch::is_silent(std::size_t sensor, double time) const noexcept {
+  return Memory::is_gap(time - heard_[sensor], memory_->loss->usual_interval(sensors_[sensor].outputs.front()));
+}
+
 /// Which sensors have come, or were to come. What is counted in samples counts those of the position, if there is one:
 /// a quick sensor beside it says little, however often.
 void SensorWatch::note_sample(double time, const double* outputs) noexcept {
+  memory_->now = time;
   memory_->loss->note(time, outputs);
   bool has_position = false, is_position = false;
   for (std::size_t s = 0; s < sensors_.size(); ++s) {
@@ -385,7 +391,7 @@ SensorWatch::Finding SensorWatch::judge(double time, double* outputs, const doub
         end_dispute();
         finding.rebase = true;
       }
-      memory_->offsets->take(filter, std::max(1.0, *std::ranges::max_element(excesses_)));
+      memory_->offsets->take(filter, std::max(1.0, *std::ranges::max_element(excesses_)), memory_->is_counted);
       const bool is_told = told >= 0 && memory_->offsets->probable() == told;
       const bool is_found = !is_disputed && memory_->offsets->has_suspect();
       if (is_told) {
@@ -439,7 +445,7 @@ SensorWatch::Finding SensorWatch::judge(double time, double* outputs, const doub
 bool SensorWatch::admits(std::size_t sensor, const Innovation& innovation) noexcept {
   Record& record = records_[sensor];
   // What it was before a gap, as while it was stuck, says nothing of it afterwards.
-  const bool comes_back = innovation.time - heard_[sensor] > Memory::longest_gap;
+  const bool comes_back = is_silent(sensor, innovation.time);
   if (comes_back) record = {};
   const bool is_suspect = record.failures >= suspect_after;
   const auto degrees = static_cast<double>(innovation.value.size());

@@ -58,8 +58,11 @@ struct SensorWatch::Hypothesis {
 struct SensorWatch::Memory {
   static constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
   static constexpr std::size_t remembered_samples = 128;
-  // Silence after which a sensor that disagrees is more likely right than the estimate [s].
-  static constexpr double longest_gap = 1.0;
+  // Silence after which a sensor that disagrees is more likely right than the estimate [s], and in usual intervals.
+  static constexpr double longest_gap = 1.0, usual_intervals_of_gap = 2.5;
+  static bool is_gap(double duration, double usual_interval) noexcept {
+    return duration > longest_gap && !(duration <= usual_intervals_of_gap * usual_interval);
+  }
   // A heading that is less certain is still being searched [rad].
   static constexpr double known_heading = 0.35;
   // Disputes longer than this many times the proof mean that nothing explains the sensors.
@@ -114,9 +117,10 @@ struct SensorWatch::Memory {
   /// Whether nothing was measured for long within so many samples.
   bool has_gap(int samples) noexcept {
     for (int ago = samples; ago > 0; --ago)
-      if (entry(ago - 1).time - entry(ago).time > longest_gap) return true;
+      if (is_gap(entry(ago - 1).time - entry(ago).time, loss->usual_interval())) return true;
     return false;
   }
+  double now = unknown;  ///< of the last sample [s]
   std::int64_t count = 0;
   std::int64_t connected = 0;  ///< of the newest, by what moves and by what is measured
   // Before the last advance, and that.

@@ -229,11 +229,11 @@ class Result:
                            "estimators": {name: self.measures(kind, name) for name in self.estimators}} for kind in self.kinds]}
 
 
-def write(page, text):
-    """Replaces what stands between the marks of each part."""
+def write(page, text, program="scripts/fault-campaign"):
+    """Replaces what stands between the marks of each part that a program writes."""
     content = page.read_text()
     for part, table in text.items():
-        begin, end = f"<!-- scripts/fault-campaign: {part} -->", "<!-- end -->"
+        begin, end = f"<!-- {program}: {part} -->", "<!-- end -->"
         head, rest = content.split(begin, 1)
         content = f"{head}{begin}\n\n{table}\n\n{end}{rest.split(end, 1)[1]}"
     draft = page.with_suffix(".md.new")

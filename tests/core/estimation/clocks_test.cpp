@@ -128,5 +128,49 @@ TEST_F(TwoClocks, EvenAWrongFirstStampIsForgotten) {
   EXPECT_NEAR(clocks.take(0, 3.5), place + 0.1, 1e-3);
 }
 
+/// Nothing says beforehand how slow a source is.
+TEST_F(TwoClocks, ASlowSourceIsKnownAfterTwoStamps) {
+  for (const double interval : {0.3, 1.0, 2.0, 7.0, 30.0}) {
+    clocks.reset();
+    EXPECT_FALSE(clocks.knows_interval(0));
+    for (int k = 0; k < 40 * 10; ++k) {
+      const double time = 10.0 + 0.1 * k;
+      EXPECT_EQ(clocks.take(1, time), time);
+      const double stamp = 10.0 + interval * std::floor((time - 10.0) / interval + 1e-9);
+      if (stamp <= clocks.newest(0)) continue;
+      EXPECT_EQ(clocks.take(0, stamp), stamp) << interval;
+      if (stamp > 10.0) {
+        EXPECT_NEAR(clocks.usual_interval(0), interval, 1e-9);
+      }
+    }
+    EXPECT_TRUE(clocks.knows_interval(0));
+    EXPECT_EQ(clocks.settings(), 0) << interval;
+  }
+}
+
+/// No other source tells the time.
+TEST(OneClock, MayBeSlowOrBecomeSlow) {
+  for (const double interval : {1.0, 2.5, 20.0}) {
+    Clocks clocks{1, {.usual_interval = 0.1, .behind = 3.0, .longest_gap = 60.0}};
+    int refused = 0;
+    for (int k = 0; k < 50; ++k) refused += std::isnan(clocks.take(0, 5.0 + interval * k));
+    EXPECT_LE(refused, 1) << interval;
+    EXPECT_EQ(clocks.settings(), 0) << interval;
+
+    clocks.reset();
+    for (int k = 0; k < 50; ++k) EXPECT_EQ(clocks.take(0, 5.0 + 0.1 * k), 5.0 + 0.1 * k);
+    refused = 0;
+    for (int k = 0; k < 50; ++k) {
+      const double time = 9.9 + interval * (k + 1), place = clocks.take(0, time);
+      refused += std::isnan(place);
+      if (k > 25) {
+        EXPECT_EQ(place, time) << interval;
+      }
+    }
+    EXPECT_LE(refused, 12) << interval;
+    EXPECT_EQ(clocks.settings(), 0) << interval;
+  }
+}
+
 }  // namespace clocks_test
 }  // namespace rhec

@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include <fmt/format.h>
+
 #include "support/sensor_faults.hpp"
 
 namespace rhec {
@@ -28,9 +30,15 @@ struct Fault {
   std::function<void(double since, Message&)> spoil;  ///< while it lasts
   double lost_speed = 0.0;                            ///< share of it that the wheels lose
 };
+struct Timing {
+  double lateness = 0.0;         ///< of positions [s]
+  int ticks = 20;                ///< of 10 ms, from one position to the next
+  double lateness_inputs = 0.0;  ///< [s]
+};
 struct Sample {
   double error;  ///< of the position [m]
   HealthLevel health;
+  std::string words;
 };
 struct Result {
   std::vector<Sample> samples;
@@ -38,8 +46,8 @@ struct Result {
   Estimator::Counts counts;
 };
 
-/// Positions at 5 Hz, the steering angle at 20 Hz between them, and inputs as they change.
-Result drive(const char* estimator_name, double lateness, const Fault& fault) {
+/// Positions at 5 Hz if not told otherwise, the steering angle at 20 Hz between them, and inputs as they change.
+Result drive(const char* estimator_name, const Timing& timing, const Fault& fault) {
   const Robot robot = watched_robot(estimator_name);
   constexpr double step = 0.01;
   std::mt19937_64 random(11);
@@ -58,9 +66,9 @@ Result drive(const char* estimator_name, double lateness, const Fault& fault) {
       messages.push_back({arrival, time, std::move(outputs)});
       if (is_on && fault.spoil) fault.spoil(since, messages.back());
     };
-    if (i % 20 == 0)
-      send(time + lateness, {truth[0] - antenna * std::cos(truth[2]) + 0.03 * noise(random),
-                             truth[1] - antenna * std::sin(truth[2]) + 0.03 * noise(random), nan});
+    if (i % timing.ticks == 0)
+      send(time + timing.lateness, {truth[0] - antenna * std::cos(truth[2]) + 0.03 * noise(random),
+                                    truth[1] - antenna * std::sin(truth[2]) + 0.03 * noise(random), nan});
     if (i % 5 == 1) send(time, {nan, nan, truth[3] + 0.017 * noise(random)});
     if (i % 20 == 0) inputs.push_back({time, {speed + 0.1 * noise(random), steering * 0.4 + 0.1 * noise(random)}});
     const double v = kappa * speed * (is_on ? 1.0 - fault.lost_speed : 1.0);
@@ -72,14 +80,15 @@ Result drive(const char* estimator_name, double lateness, const Fault& fault) {
   std::size_t next = 0, next_input = 0;
   // Beyond the end everything has arrived.
   for (double now = 0.0; now < duration + 1.0; now += asked_every) {
-    for (; next_input < inputs.size() && inputs[next_input].first <= now; ++next_input)
+    for (; next_input < inputs.size() && inputs[next_input].first + timing.lateness_inputs <= now; ++next_input)
       estimator->push_input(inputs[next_input].first, inputs[next_input].second.data());
     for (; next < messages.size() && messages[next].arrival <= now + 1e-9; ++next)
       estimator->push_measurement(messages[next].stamp, messages[next].outputs.data());
     const double asked = std::min(now, duration - step);
     const Estimate& estimate = estimator->estimate(asked);
     const Eigen::Vector4d& there = states[static_cast<std::size_t>(std::lround(asked / step))];
-    result.samples.push_back({(estimate.state.head<2>() - there.head<2>()).norm(), estimate.health.level});
+    result.samples.push_back({(estimate.state.head<2>() - there.head<2>()).norm(), estimate.health.level,
+                              in_words(estimate.health, estimator->watch()->sensors())});
     result.last = estimate;
   }
   result.counts = estimator->counts();
@@ -113,7 +122,7 @@ INSTANTIATE_TEST_SUITE_P(All, LateReceiver,
 
 /// As fast as if it was not late, but for that.
 TEST_P(LateReceiver, RecoversFromFaults) {
-  const Result late = drive(estimator, 0.17, fault);
+  const Result late = drive(estimator, {.lateness = 0.17}, fault);
   const auto first = static_cast<std::size_t>((fault_begins + fault.length + 3.0) / asked_every);
   for (std::size_t k = 0; k < late.samples.size(); ++k) {
     const bool is_after = k >= first, is_before = k * asked_every > 5.0 && k * asked_every < fault_begins;
@@ -130,7 +139,7 @@ TEST_P(LateReceiver, RecoversFromFaults) {
 
 /// Once all is there, it is where it would be.
 TEST_P(LateReceiver, EndsWhereItWouldBeInTime) {
-  const Result late = drive(estimator, 0.17, fault), in_time = drive(estimator, 0.0, fault);
+  const Result late = drive(estimator, {.lateness = 0.17}, fault), in_time = drive(estimator, {}, fault);
   const bool is_window = std::string(estimator) == "rhe";
   const double tolerance = is_window ? 0.2 : 1e-6;  // of a standard deviation; a window is solved by single steps
   for (Eigen::Index j = 0; j < late.last.state.size(); ++j)
@@ -143,7 +152,7 @@ TEST_P(LateReceiver, EndsWhereItWouldBeInTime) {
 TEST(LateReceivers, ThatHaveMovedAreFollowed) {
   for (const char* estimator : {"ekf", "bank", "rhe"}) {
     const Fault fault{.name = "Moved", .length = duration, .spoil = [](double, Message& m) { displace(m, 10.0); }};
-    const Result late = drive(estimator, 0.17, fault);
+    const Result late = drive(estimator, {.lateness = 0.17}, fault);
     const auto error_at = [&](double time) {
       return late.samples[static_cast<std::size_t>(std::lround(time / asked_every))].error;
     };
@@ -151,6 +160,32 @@ TEST(LateReceivers, ThatHaveMovedAreFollowed) {
     EXPECT_NEAR(error_at(fault_begins + 3.5), 10.0, 0.5) << estimator << ": it has moved by 10 m";
     EXPECT_NEAR(late.samples.back().error, 10.0, 0.5) << estimator;
   }
+}
+
+/// Whose messages nothing else is in: that the others are silent in these is no reason to follow it.
+TEST(QuickEncoders, ThatAreOffAreNotFollowedBesideASlowReceiver) {
+  const Fault fault{.name = "Off", .length = 10.0, .spoil = [](double, Message& m) { m.outputs[2] += 0.15; }};
+  for (const char* estimator : {"ekf", "bank", "rhe"}) {
+    const Result result = drive(estimator, {.lateness = 0.17, .ticks = 100}, fault);
+    for (std::size_t k = 150; k < result.samples.size(); ++k) {
+      EXPECT_LT(result.samples[k].error, 1.0) << estimator << " " << k;
+      EXPECT_EQ(result.samples[k].words.find("moved"), std::string::npos) << estimator << " " << k;
+    }
+    EXPECT_EQ(result.samples.back().health, HealthLevel::ok) << estimator;
+  }
+}
+
+/// Nobody is told how slow a receiver is, nor how late it and the inputs are: that is no reason for doubt.
+TEST(SlowReceivers, ThatAreLateAreNoReasonForDoubt) {
+  for (const char* estimator : {"ekf", "bank", "rhe"})
+    for (const int ticks : {50, 100})
+      for (const double lateness : {0.0, 0.35}) {
+        SCOPED_TRACE(fmt::format("{}, every {} s, {} s late", estimator, 0.01 * ticks, lateness));
+        const Timing timing{.lateness = lateness, .ticks = ticks, .lateness_inputs = 0.5 * lateness};
+        const Result slow = drive(estimator, timing, faults[0]);
+        for (std::size_t k = 120; k < slow.samples.size(); ++k) EXPECT_EQ(slow.samples[k].words, "ok") << k;
+        EXPECT_EQ(slow.counts.dropped, 0);
+      }
 }
 
 }  // namespace estimator_late_sensor_test

@@ -23,6 +23,9 @@ TEST(Health, InWords) {
   EXPECT_EQ(in_words(health, sensors),
             "degraded: x_gps and y_gps rejected and moved; delta off by about -0.052 rad from x_gps and y_gps; inputs "
             "implausible");
+  health.sensors[1].offset = 0.0;
+  EXPECT_EQ(in_words(health, sensors),
+            "degraded: x_gps and y_gps rejected and moved; delta was off from x_gps and y_gps; inputs implausible");
   health.sensors[1] = {};
   health = {.level = HealthLevel::lost, .reasons = reason::uncertain, .sensors = health.sensors, .inputs = {}};
   EXPECT_EQ(in_words(health, sensors), "lost: uncertain; x_gps and y_gps rejected and moved");

@@ -39,13 +39,13 @@ struct WatchedBoat {
     filter.covariance() = 0.01 * Eigen::MatrixXd::Identity(4, 4);
     if (walk == 0.0) filter.covariance()(3, 3) = 0.0;
   }
-  void take(std::vector<double> outputs) {
+  void take(std::vector<double> outputs, bool counts = true) {
     const double input = 0.2;
     watch.correct(outputs.data());
     filter.predict(&input, 0.1, nullptr, &watch.sensitivities());
     filter.expect();
     filter.update(outputs.data());
-    watch.take(filter, 1.0);
+    watch.take(filter, 1.0, counts);
   }
   Estimate estimate() {
     Estimate estimate;
@@ -90,6 +90,35 @@ TEST(OffsetWatch, TakesOutWhatAnOffsetHasDone) {
   EXPECT_NEAR(misled.watch.offset(rate), offset, 1e-9);
   EXPECT_LT((misled.filter.mean() - told.filter.mean()).norm(), 1e-9);
   EXPECT_EQ(misled.watch.offset(0), 0.0);
+}
+
+/// No offset is larger than ten typical magnitudes: one that is known does not grow beyond that.
+TEST(OffsetWatch, FindsNoneThatCannotBe) {
+  for (const double known : {5.0, 9.9, -9.9}) {
+    TrueBoat truth;
+    WatchedBoat boat;
+    for (int k = 0; k < 30; ++k) boat.take(truth.measure(0.0, 0.0));
+    boat.watch.adopt(rate, known, 1e-4);
+    bool is_found = false;
+    for (int k = 0; k < 100; ++k) {
+      boat.take(truth.measure(0.0, known + std::copysign(offset, known)));
+      is_found = is_found || boat.watch.has_suspect();
+    }
+    EXPECT_EQ(is_found, std::abs(known) + offset < 10.0) << known;
+  }
+}
+
+/// A quick sensor beside others has many samples that say little: time is not counted in these.
+TEST(OffsetWatch, AgesBySamplesThatCount) {
+  for (const bool counts : {true, false}) {
+    TrueBoat truth;
+    WatchedBoat boat;
+    for (int k = 0; k < 60; ++k) boat.take(truth.measure(0.0, 0.0));
+    boat.watch.adopt(rate, offset, 1e-4);
+    for (int k = 0; k < 200; ++k) boat.take(truth.measure(0.0, offset), counts);
+    EXPECT_TRUE(boat.watch.has_any());
+    EXPECT_NE(boat.watch.has_recent(), counts);
+  }
 }
 
 TEST(OffsetWatch, FindsNoneInWhiteNoise) {

@@ -14,7 +14,7 @@ Variable variable(const char* name, const char* unit) {
   return result;
 }
 
-TEST(Sensors, OutputsOfOneUnitAndNoiseAreOneSensor) {
+TEST(Sensors, CoordinatesOfOneNoiseAreOneSensor) {
   ModelDescription about;
   about.outputs = {variable("x", "m"), variable("psi", "rad"), variable("y", "m"), variable("range", "m")};
   const std::vector<Sensor> sensors = sensors_of(about, {0.01, 0.02, 0.01, 0.03});
@@ -23,6 +23,34 @@ TEST(Sensors, OutputsOfOneUnitAndNoiseAreOneSensor) {
   EXPECT_EQ(sensors[0].outputs, (std::vector<int>{0, 2}));
   EXPECT_EQ(sensors[1].name, "psi");
   EXPECT_EQ(sensors[2].outputs, (std::vector<int>{3}));
+}
+
+/// Of a tractor and its trailer, say, with receivers and encoders that are stated alike.
+TEST(Sensors, WhatCanFailByItselfIsASensorByItself) {
+  ModelDescription about;
+  about.outputs = {variable("x_front", "m"), variable("x_rear", "m"),        variable("y_front", "m"),
+                   variable("y_rear", "m"),  variable("steering", "rad"),    variable("hitch", "rad"),
+                   variable("vx", "m/s"),    variable("wheel_speed", "m/s"), variable("vy", "m/s")};
+  const std::vector<Sensor> sensors = sensors_of(about, std::vector<double>(about.outputs.size(), 0.01));
+  ASSERT_EQ(sensors.size(), 6u);
+  EXPECT_EQ(sensors[0].name, "x_front and y_front");
+  EXPECT_EQ(sensors[1].name, "x_rear and y_rear");
+  EXPECT_EQ(sensors[2].name, "steering");
+  EXPECT_EQ(sensors[3].name, "hitch");
+  EXPECT_EQ(sensors[4].name, "vx and vy");
+  EXPECT_EQ(sensors[5].name, "wheel_speed");
+}
+
+TEST(Sensors, CoordinatesMayHaveAnyNames) {
+  ModelDescription about;
+  about.states = {variable("easting", "km")};
+  about.roles.position_x = 0;
+  about.outputs = {variable("east", "km"), variable("depth", "m"), variable("north", "km"), variable("height", "m")};
+  const std::vector<Sensor> sensors = sensors_of(about, std::vector<double>(about.outputs.size(), 0.01));
+  ASSERT_EQ(sensors.size(), 3u);
+  EXPECT_EQ(sensors[0].name, "east and north");
+  EXPECT_EQ(sensors[1].name, "depth");
+  EXPECT_EQ(sensors[2].name, "height");
 }
 
 TEST(Sensors, WhatIsMeasuredTwiceIsSeenByTwo) {
@@ -39,10 +67,13 @@ TEST(Sensors, WhatIsMeasuredTwiceIsSeenByTwo) {
 
 TEST(Sensors, NoSensorHasMoreOutputsThanFit) {
   ModelDescription about;
-  about.outputs.assign(2 * most_sensor_outputs + 1, variable("y", "m"));
-  const std::vector<Sensor> sensors = sensors_of(about, std::vector<double>(about.outputs.size(), 1.0));
-  ASSERT_EQ(sensors.size(), 3u);
-  EXPECT_EQ(sensors[2].outputs.size(), 1u);
+  about.outputs.assign(7, variable("y", "m"));
+  EXPECT_EQ(sensors_of(about, std::vector<double>(7, 1.0)).size(), 4u);
+  about.outputs = {variable("x_gps", "m"), variable("y_gps", "m"), variable("z_gps", "m"), variable("z", "m")};
+  const std::vector<Sensor> sensors = sensors_of(about, std::vector<double>(4, 1.0));
+  ASSERT_EQ(sensors.size(), 2u);
+  EXPECT_EQ(sensors[0].outputs, (std::vector<int>{0, 1, 2}));
+  EXPECT_EQ(std::ssize(sensors[0].outputs), most_sensor_outputs);
 }
 
 }  // namespace sensor_test

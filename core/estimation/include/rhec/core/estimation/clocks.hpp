@@ -1,10 +1,12 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <vector>
 
 #include "rhec/core/base/export.hpp"
+#include "rhec/core/estimation/rhythm.hpp"
 
 namespace rhec {
 
@@ -38,8 +40,9 @@ class RHEC_EXPORT Clocks {
   double offset_of(double time) const noexcept;
   /// The newest time on the timeline that a stamp was given; NaN before the first.
   double now() const noexcept { return now_; }
-  /// Usual interval of a source [s].
-  double usual_interval(int source) const noexcept { return sources_[source].usual; }
+  bool knows_interval(int source) const noexcept { return !std::isnan(sources_[source].rhythm.interval()); }
+  /// Usual interval of a source [s]; that of the set-up before its second stamp.
+  double usual_interval(int source) const noexcept { return usual_interval(sources_[source]); }
   /// Newest time of a source on the timeline; NaN before its first.
   double newest(int source) const noexcept { return sources_[source].newest; }
   /// Whether the source's last stamp was refused, or its clock has just been set.
@@ -52,8 +55,10 @@ class RHEC_EXPORT Clocks {
  private:
   static constexpr std::size_t remembered = 128;
   struct Source {
-    double offset = 0.0, newest = 0.0, usual = 0.0;
+    double offset = 0.0, newest = 0.0;
+    Rhythm rhythm;
     double first_suspect = 0.0, last_suspect = 0.0;  ///< stamps
+    double suspect_interval = 0.0;                   ///< the last one
     int suspects = 0;
     std::array<double, remembered> times{};  ///< of its newest stamps, in a ring
     std::size_t count = 0;
@@ -62,6 +67,7 @@ class RHEC_EXPORT Clocks {
   Place place(const Source& source, double time) const noexcept;
   /// Whether a time lies between stamps of a source that are no further apart than others.
   static bool is_within(const Source& source, double time) noexcept;
+  double usual_interval(const Source& source) const noexcept;
   double room_ahead(const Source& source) const noexcept;
   double use(Source& source, double time) noexcept;
   void suspect(Source& source, double stamp) noexcept;

@@ -50,7 +50,8 @@ class RHEC_EXPORT Estimator {
   /// measurement, e.g. as its receiver states them; those that are not above 0 are as always. A measurement counts for
   /// no more than one that is a hundred times more accurate than usual, and is missing if its deviation is infinite.
   void push_measurement(double time, const double* outputs, const double* sigmas = nullptr) noexcept;
-  /// Measured u (n_u, of the vehicle alone; NaN where missing), which holds from a time [s] on.
+  /// Measured u (n_u, of the vehicle alone; NaN where missing), which holds from a time [s] on. With a judge, what is
+  /// missing for up to a second, or five of the usual intervals, is what it was; without, it is not known.
   void push_input(double time, const double* inputs) noexcept;
 
   /// The estimate at a time [s], from all that was pushed with stamps up to it. Beyond the newest node it is integrated
@@ -118,9 +119,12 @@ class RHEC_EXPORT Estimator {
   SensorWatch::Finding judge(double time, MeasuredOutputs& outputs, Clock::time_point deadline) noexcept;
   int inputs_source() const noexcept { return static_cast<int>(presence_.size()); }
   double longest_silence(int source) const noexcept;
+  void hold_missing_inputs(double time) noexcept;
   template <class Function>
   void through_motion(double from, double to, Clock::time_point deadline, const Function& advance) noexcept;
   void guess_input(double since, double begin, double end) noexcept;
+  void note_ages(double time) noexcept;
+  SensorWatch::Presence presence(int source, double time) const noexcept;
   void assess(Estimate& estimate, double time) noexcept;
   void rebase(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance) noexcept;
   bool take_in(double until, Clock::time_point deadline) noexcept;
@@ -152,9 +156,20 @@ class RHEC_EXPORT Estimator {
     double lag = 0.0, newest = 0.0;
   };
   std::vector<Delivery> deliveries_;
+  /// How old the newest message of a source is when somebody asks for an estimate [s].
+  struct Age {
+    double newest;       ///< stamp of that message; NaN: none
+    double last, usual;  ///< at the last estimate, and before the next message comes, on average
+  };
+  std::vector<Age> ages_;    ///< of the sensors, and last of the inputs
   double newest_row_ = 0.0;  ///< stamp of the newest measurement of all [s]; NaN: none
   double ahead_ = 0.0;       ///< how far the judge has looked ahead [s]; NaN: not since the last sample that was judged
   double used_ = 0.0;        ///< up to there measurements have been used before they were judged [s]
+  /// What an input was when it was measured last, and when [s]; NaN: never.
+  struct HeldInput {
+    double value, time;
+  };
+  std::vector<HeldInput> held_inputs_;
   std::vector<double> input_sigmas_;
   std::vector<SensorWatch::Presence> presence_;
 };

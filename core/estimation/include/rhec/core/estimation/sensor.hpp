@@ -15,12 +15,13 @@ struct Sensor {
   std::string unit = {};     ///< of these
 };
 
-/// A sensor has at most so many outputs; further ones that are like them make another one.
-inline constexpr int most_sensor_outputs = 6;
+/// A sensor has at most so many outputs: the coordinates of a position.
+inline constexpr int most_sensor_outputs = 3;
 
-/// The sensors of a model: outputs of one unit and one stated variance, like the coordinates of a position, are one;
-/// those of several devices (`Variable::device`), such as two receivers, are not.
-/// `output_variances`: n_y.
+/// The sensors of a model. Outputs are one where they are the coordinates of a place or of a velocity: of one unit,
+/// one stated variance and one device (`Variable::device`), and either named alike but for an x, a y and a z, or two
+/// in the unit of the position of which one is the next. Any other output is a sensor of its own: two receivers, or a
+/// steering angle and an articulation, can fail one without the other. `output_variances`: n_y.
 RHEC_EXPORT std::vector<Sensor> sensors_of(const ModelDescription& about, const std::vector<double>& output_variances);
 
 }  // namespace rhec

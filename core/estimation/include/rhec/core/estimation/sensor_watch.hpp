@@ -134,6 +134,7 @@ class RHEC_EXPORT SensorWatch {
   void find_stuck(double*outputs) noexcept, note_sample(double time, const double*outputs) noexcept;
   void note_motion(double duration, const double* inputs) noexcept;
   bool is_searching() const noexcept, is_expected(std::size_t sensor) const noexcept;
+  bool is_silent(std::size_t sensor, double time) const noexcept;
   int offset_in_dispute() noexcept;
   void start_search(const double* outputs) noexcept;
   void search_from(WalkingFilter& filter, HeadingSearch& search) noexcept;
@@ -166,8 +167,7 @@ class RHEC_EXPORT SensorWatch {
   bool is_position_disputed() const noexcept, is_place_disputed() const noexcept;
   bool is_place_lost() const noexcept, is_placed_otherwise() const noexcept;
   bool is_within_bounds(const Eigen::VectorXd&mean) const noexcept, is_probably_slip() const noexcept;
-  void test_inputs(const double* outputs) noexcept;
-  void note_offsets() noexcept, note_corrected(bool has_jumped) noexcept;
+  void note_offsets() noexcept, note_corrected(bool has_jumped) noexcept, test_inputs(const double*outputs) noexcept;
   void remember(double time, const double* outputs) noexcept;
   void note_volume(const Estimate& estimate) noexcept;
   double limit(std::size_t sensor, Eigen::Index degrees) const noexcept;

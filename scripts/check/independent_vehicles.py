@@ -1,0 +1,295 @@
+"""Vehicles that move by equations of their own, and what their sensors say: nothing of it is from rhec.
+
+Wheels, steering and hitches lag, vehicles drift sideways, slip wanders in time and jumps, fixes are coloured, encoders have steps,
+zeros drift, clocks began weeks ago, and each sensor has a rate and a latency. A vehicle says how somebody would configure rhec for
+it: with what data sheets say, not with what is true.
+"""
+import dataclasses
+import math
+
+import numpy
+
+TICK = 0.01  # [s] of the vehicle's motion
+
+
+@dataclasses.dataclass(frozen=True)
+class Sensor:
+    """What a sensor says of a vehicle: values of `read`, wrong by these errors, every `every` ticks, `late` seconds later."""
+    name: str
+    kind: str                # position, angle, rate, speed
+    outputs: tuple           # of the model
+    every: int               # [ticks]
+    phase: int               # [ticks]
+    late: float              # [s]
+    jitter: float            # [s] of that
+    white: float             # standard deviation of noise
+    coloured: float = 0.0    # standard deviation of noise that has a memory
+    memory: float = 0.8      # of the coloured noise from one value to the next
+    quantum: float = 0.0     # step of the values
+    zero: float = 0.0        # standard deviation of an offset from the start
+    walk: float = 0.0        # by which it wanders, per square root of a second
+
+
+class Errors:
+    """Of one sensor on one drive."""
+
+    def __init__(self, sensor, noise):
+        self.sensor, self.noise = sensor, noise
+        self.colour = numpy.zeros(len(sensor.outputs))
+        self.zero = sensor.zero * noise.normal(size=len(sensor.outputs))
+
+    def of(self, exact):
+        sensor, size = self.sensor, len(self.sensor.outputs)
+        drive = sensor.coloured * math.sqrt(1.0 - sensor.memory**2)
+        self.colour = sensor.memory * self.colour + drive * self.noise.normal(size=size)
+        self.zero = self.zero + sensor.walk * math.sqrt(sensor.every * TICK) * self.noise.normal(size=size)
+        value = exact + self.zero + self.colour + sensor.white * self.noise.normal(size=size)
+        return numpy.round(value / sensor.quantum) * sensor.quantum if sensor.quantum > 0.0 else value
+
+
+class Slip:
+    """Wanders about a level that jumps now and then."""
+
+    def __init__(self, noise, least, most):
+        self.noise, self.least, self.most = noise, least, most
+        self.level = self.value = noise.uniform(least, most)
+        self.next_jump = noise.exponential(15.0)
+
+    def step(self):
+        self.next_jump -= TICK
+        if self.next_jump < 0.0:
+            self.level, self.next_jump = self.noise.uniform(self.least, self.most), self.noise.exponential(15.0)
+        self.value += TICK / 8.0 * (self.level - self.value) + 0.02 * math.sqrt(TICK) * (self.most - self.least) / 0.3 * self.noise.normal()
+        self.value = min(max(self.value, self.least - 0.05), self.most + 0.02, 1.0)
+        return self.value
+
+
+class Sideways:
+    """An angle of drift that no model knows."""
+
+    def __init__(self, noise, size):
+        self.noise, self.size, self.angle = noise, size, 0.0
+
+    def step(self):
+        self.angle += -TICK / 2.0 * self.angle + self.size * math.sqrt(TICK) * self.noise.normal()
+        return self.angle
+
+
+def antenna(x, y, psi, ahead, left=0.0):
+    return numpy.array([x + ahead * math.cos(psi) - left * math.sin(psi), y + ahead * math.sin(psi) + left * math.cos(psi)])
+
+
+class Bicycle:
+    """A car-like robot: a receiver with RTK whose fixes are late, and an encoder of the steering."""
+    step, heading, inputs_every, inputs_late = 0.2, 2, 4, 0.002
+    sensors = (Sensor("gps", "position", ("x_gps", "y_gps"), 20, 7, 0.12, 0.03, 0.020, 0.015),
+               Sensor("steering", "angle", ("delta",), 5, 2, 0.004, 0.0, 0.012, quantum=0.004))
+    wheelbase, behind = 1.4, 0.4
+
+    def __init__(self, noise, speed):
+        self.noise, self.speed, self.time = noise, speed, 0.0
+        self.x = self.y = self.psi = self.delta = self.v = 0.0
+        self.kappa, self.mu, self.sideways = Slip(noise, 0.65, 0.98), Slip(noise, 0.75, 1.0), Sideways(noise, 0.01)
+        self.pace, self.phase = noise.uniform(0.15, 0.5), noise.uniform(0.0, 6.0)
+        self.spin, self.yaw_rate, self.inputs = 0.0, 0.0, numpy.zeros(2)
+
+    @classmethod
+    def configuration(cls, estimator):
+        return {"step": cls.step, "model": {"name": "bicycle_slip", "wheelbase": cls.wheelbase, "gps_offset": cls.behind},
+                "noise": {"outputs": {"x_gps": 0.03, "y_gps": 0.03, "delta": 0.017}, "inputs": {"u1": 0.1, "u2": 0.1}},
+                "estimator": {"name": estimator, "initial": {"parameters": {"kappa": 0.9, "mu": 0.9}, "sigma": {"beta": 0.3}}}}
+
+    def advance(self):
+        kappa, mu, angle = self.kappa.step(), self.mu.step(), self.sideways.step()
+        wheels = self.speed * (1.0 + 0.1 * math.sin(0.3 * self.time))
+        wanted = 0.35 * math.sin(self.pace * self.time + self.phase)
+        turning = min(max(3.0 * (wanted - self.delta), -0.6), 0.6)
+        self.v += (kappa * (1.0 - self.spin) * wheels - self.v) * TICK / 0.1
+        self.yaw_rate = self.v / self.wheelbase * math.tan(mu * self.delta)
+        self.x += TICK * self.v * math.cos(self.psi + angle)
+        self.y += TICK * self.v * math.sin(self.psi + angle)
+        self.psi += TICK * self.yaw_rate
+        self.delta += TICK * turning
+        self.time += TICK
+        self.inputs = numpy.array([wheels, turning])
+
+    def truth(self):
+        return numpy.array([self.x, self.y]), self.psi
+
+    def read(self, sensor):
+        return {"gps": lambda: antenna(self.x, self.y, self.psi, -self.behind), "steering": lambda: numpy.array([self.delta])}[sensor]()
+
+
+class Rover(Bicycle):
+    """A cheap receiver at 1 Hz with coloured errors, a compass whose zero drifts, and a gyro with a bias."""
+    step, inputs_every, inputs_late = 0.1, 5, 0.06
+    sensors = (Sensor("gps", "position", ("x_gps", "y_gps"), 100, 31, 0.20, 0.05, 0.15, 0.35, 0.9),
+               Sensor("steering", "angle", ("delta",), 5, 2, 0.01, 0.0, 0.012, quantum=0.004),
+               Sensor("compass", "angle", ("heading",), 10, 4, 0.02, 0.0, 0.02, 0.02, 0.95, zero=0.01),
+               Sensor("gyro", "rate", ("yaw_rate",), 2, 0, 0.005, 0.0, 0.008, zero=0.02, walk=0.001))
+
+    @classmethod
+    def configuration(cls, estimator):
+        return {"step": cls.step, "model": {"name": "bicycle_slip", "wheelbase": cls.wheelbase, "gps_offset": cls.behind,
+                                            "outputs": ["x_gps", "y_gps", "delta", "heading", "yaw_rate"]},
+                "noise": {"outputs": {"x_gps": 0.4, "y_gps": 0.4, "delta": 0.017, "heading": 0.035, "yaw_rate": 0.01},
+                          "inputs": {"u1": 0.1, "u2": 0.1}, "biases": {"yaw_rate": {"sigma": 0.03, "drift": 0.001}}},
+                "estimator": {"name": estimator, "horizon": "4 s", "initial": {"parameters": {"kappa": 0.9, "mu": 0.9}, "sigma": {"beta": 0.3}}}}
+
+    def read(self, sensor):
+        if sensor == "compass":
+            return numpy.array([self.psi])
+        return numpy.array([self.yaw_rate]) if sensor == "gyro" else super().read(sensor)
+
+
+class TwoReceivers(Bicycle):
+    """A receiver with RTK, and a cheap one that comes late."""
+    sensors = Bicycle.sensors + (Sensor("poor", "position", ("x_poor", "y_poor"), 20, 13, 0.25, 0.05, 0.3, 0.3, 0.95),)
+
+    @classmethod
+    def configuration(cls, estimator):
+        configuration = super().configuration(estimator)
+        configuration["model"]["outputs"] = ["x_gps", "y_gps", "delta", {"x_poor": "x_gps"}, {"y_poor": "y_gps"}]
+        configuration["noise"]["outputs"] |= {"x_poor": 0.5, "y_poor": 0.5}
+        return configuration
+
+    def read(self, sensor):
+        return super().read("gps" if sensor == "poor" else sensor)
+
+
+class SkidSteer:
+    """Wheels of two sides, a receiver with RTK at 10 Hz, and a compass."""
+    step, heading, inputs_every, inputs_late = 0.1, 2, 5, 0.01
+    sensors = (Sensor("gps", "position", ("x_gps", "y_gps"), 10, 3, 0.06, 0.01, 0.015, 0.012),
+               Sensor("compass", "angle", ("heading",), 5, 1, 0.01, 0.0, 0.01, 0.008, 0.9))
+    radius, track, ahead, left = 0.14, 0.6, 0.2, 0.1
+
+    def __init__(self, noise, speed):
+        self.noise, self.speed, self.time = noise, 0.35 * speed, 0.0
+        self.x = self.y = self.psi = self.v = self.turn = 0.0
+        self.slips, self.ahead_of_centre = (Slip(noise, 0.02, 0.35), Slip(noise, 0.02, 0.35)), Slip(noise, -0.12, 0.12)
+        self.pace, self.phase = noise.uniform(0.15, 0.5), noise.uniform(0.0, 6.0)
+        self.spin, self.inputs = 0.0, numpy.zeros(2)
+
+    @classmethod
+    def configuration(cls, estimator):
+        return {"step": cls.step, "model": {"name": "skid_steer", "wheel_radius": cls.radius, "track_width": cls.track, "antenna_x": cls.ahead,
+                                            "antenna_y": cls.left},
+                "noise": {"outputs": {"x_gps": 0.02, "y_gps": 0.02, "heading": 0.02}, "inputs": {"omega_left": 0.3, "omega_right": 0.3}},
+                "estimator": {"name": estimator, "horizon": "2 s", "initial": {"sigma": {"psi": 0.3}}}}
+
+    def advance(self):
+        wanted = 0.5 * math.sin(self.pace * self.time + self.phase)
+        sides = numpy.array([self.speed - wanted * self.track / 2.0, self.speed + wanted * self.track / 2.0]) * (1.0 + 0.1 * math.sin(0.3 * self.time))
+        left, right = ((1.0 - slip.step()) * (1.0 - self.spin) * side for slip, side in zip(self.slips, sides))
+        self.v += (0.5 * (left + right) - self.v) * TICK / 0.08
+        self.turn += ((right - left) / self.track - self.turn) * TICK / 0.08
+        sideways = -self.ahead_of_centre.step() * self.turn
+        self.x += TICK * (self.v * math.cos(self.psi) - sideways * math.sin(self.psi))
+        self.y += TICK * (self.v * math.sin(self.psi) + sideways * math.cos(self.psi))
+        self.psi += TICK * self.turn
+        self.time += TICK
+        self.inputs = sides / self.radius
+
+    def truth(self):
+        return numpy.array([self.x, self.y]), self.psi
+
+    def read(self, sensor):
+        return antenna(self.x, self.y, self.psi, self.ahead, self.left) if sensor == "gps" else numpy.array([self.psi])
+
+
+class Tracks:
+    """A tracked vehicle with a receiver and a gyro, and without a compass."""
+    step, heading, inputs_every, inputs_late = 0.1, 2, 5, 0.01
+    sensors = (Sensor("gps", "position", ("x_gps", "y_gps"), 20, 3, 0.15, 0.02, 0.02, 0.02),
+               Sensor("gyro", "rate", ("yaw_rate",), 2, 0, 0.003, 0.0, 0.006, zero=0.01, walk=0.0005))
+    ahead = 0.3
+
+    def __init__(self, noise, speed):
+        self.noise, self.speed, self.time = noise, 0.6 * speed, 0.0
+        self.x = self.y = self.psi = self.v = self.turn = 0.0
+        self.straight, self.round, self.sideways = Slip(noise, 0.6, 0.98), Slip(noise, 0.6, 0.98), Sideways(noise, 0.01)
+        self.pace, self.phase = noise.uniform(0.15, 0.5), noise.uniform(0.0, 6.0)
+        self.spin, self.inputs = 0.0, numpy.zeros(2)
+
+    @classmethod
+    def configuration(cls, estimator):
+        return {"step": cls.step, "model": {"name": "unicycle_traction", "antenna_x": cls.ahead, "outputs": ["x_gps", "y_gps", "yaw_rate"]},
+                "noise": {"outputs": {"x_gps": 0.03, "y_gps": 0.03, "yaw_rate": 0.01}, "inputs": {"v": 0.1, "omega": 0.05},
+                          "biases": {"yaw_rate": {"sigma": 0.02, "drift": 0.001}}},
+                "estimator": {"name": estimator, "horizon": "3 s", "initial": {"parameters": {"mu": 0.8, "kappa": 0.8}, "sigma": {"psi": 0.3}}}}
+
+    def advance(self):
+        wanted = 0.5 * math.sin(self.pace * self.time + self.phase)
+        speed = self.speed * (1.0 + 0.1 * math.sin(0.3 * self.time))
+        self.v += (self.straight.step() * (1.0 - self.spin) * speed - self.v) * TICK / 0.1
+        self.turn += (self.round.step() * wanted - self.turn) * TICK / 0.1
+        angle = self.sideways.step()
+        self.x += TICK * self.v * math.cos(self.psi + angle)
+        self.y += TICK * self.v * math.sin(self.psi + angle)
+        self.psi += TICK * self.turn
+        self.time += TICK
+        self.inputs = numpy.array([speed, wanted])
+
+    def truth(self):
+        return numpy.array([self.x, self.y]), self.psi
+
+    def read(self, sensor):
+        return antenna(self.x, self.y, self.psi, self.ahead) if sensor == "gps" else numpy.array([self.turn])
+
+
+class Tractor:
+    """A tractor with a trailer; the receivers of both, a steering encoder and one of the hitch."""
+    step, heading, inputs_every, inputs_late = 0.2, 2, 5, 0.01
+    sensors = (Sensor("gps", "position", ("x_trailer_gps", "y_trailer_gps"), 20, 7, 0.10, 0.02, 0.02, 0.015),
+               Sensor("front", "position", ("x_tractor_gps", "y_tractor_gps"), 20, 7, 0.10, 0.02, 0.02, 0.015),
+               Sensor("steering", "angle", ("delta",), 5, 2, 0.01, 0.0, 0.012, quantum=0.004),
+               Sensor("hitch", "angle", ("articulation",), 5, 2, 0.01, 0.0, 0.012, quantum=0.004))
+    wheelbase, trailer, behind, ahead = 1.4, 1.3, 1.1, 0.5
+
+    def __init__(self, noise, speed):
+        self.noise, self.speed, self.time = noise, 0.6 * speed, 0.0
+        self.x, self.y = self.trailer + self.behind, 0.0  # the tractor's rear axle
+        self.psi = self.psi_trailer = self.delta = self.v = 0.0
+        self.mu, self.kappa, self.eta, self.sideways = Slip(noise, 0.75, 0.98), Slip(noise, 0.7, 1.0), Slip(noise, 0.7, 1.0), Sideways(noise, 0.005)
+        self.pace, self.phase = noise.uniform(0.1, 0.3), noise.uniform(0.0, 6.0)
+        self.spin, self.inputs = 0.0, numpy.zeros(2)
+
+    @classmethod
+    def configuration(cls, estimator):
+        outputs = [output for sensor in cls.sensors for output in sensor.outputs]
+        return {"step": cls.step, "model": {"name": "tractor_trailer", "wheelbase": cls.wheelbase, "trailer_length": cls.trailer, "hitch": cls.behind,
+                                            "tractor_antenna_x": cls.ahead, "outputs": outputs},
+                "noise": {"outputs": {output: 0.03 if "gps" in output else 0.017 for output in outputs}, "inputs": {"v": 0.1, "delta_rate": 0.1}},
+                "estimator": {"name": estimator, "initial": {"parameters": {"mu": 0.85, "kappa": 0.85, "eta": 0.85},
+                                                             "sigma": {"psi_trailer": 0.3, "psi_tractor": 0.3}}}}
+
+    def advance(self):
+        wheels = self.speed * (1.0 + 0.1 * math.sin(0.3 * self.time))
+        turning = min(max(3.0 * (0.3 * math.sin(self.pace * self.time + self.phase) - self.delta), -0.6), 0.6)
+        self.v += (self.mu.step() * (1.0 - self.spin) * wheels - self.v) * TICK / 0.1
+        turn, angle = self.v / self.wheelbase * math.tan(self.kappa.step() * self.delta), self.sideways.step()
+        # The velocity of the hitch, of which the trailer's wheels leave a share across.
+        hitch = self.eta.step() * (self.psi - self.psi_trailer)
+        turn_trailer = (self.v * math.sin(hitch) - self.behind * turn * math.cos(hitch)) / self.trailer
+        self.x += TICK * self.v * math.cos(self.psi + angle)
+        self.y += TICK * self.v * math.sin(self.psi + angle)
+        self.psi += TICK * turn
+        self.psi_trailer += TICK * turn_trailer
+        self.delta += TICK * turning
+        self.time += TICK
+        self.inputs = numpy.array([wheels, turning])
+
+    def axle(self):
+        hitch = antenna(self.x, self.y, self.psi, -self.behind)
+        return antenna(*hitch, self.psi_trailer, -self.trailer)
+
+    def truth(self):
+        return self.axle(), self.psi_trailer
+
+    def read(self, sensor):
+        return {"gps": self.axle, "front": lambda: antenna(self.x, self.y, self.psi, self.ahead), "steering": lambda: numpy.array([self.delta]),
+                "hitch": lambda: numpy.array([self.psi - self.psi_trailer])}[sensor]()
+
+
+VEHICLES = {"bicycle": Bicycle, "rover": Rover, "two_receivers": TwoReceivers, "skid_steer": SkidSteer, "tracks": Tracks, "tractor": Tractor}
