@@ -23,10 +23,7 @@ Clocks::Clocks(int sources, const Setup& setup) : setup_(setup), sources_(source
 void Clocks::reset() noexcept {
   now_ = unknown;
   refused_ = settings_ = 0;
-  for (Source& source : sources_) {
-    source = {};
-    source.newest = unknown;
-  }
+  std::ranges::fill(sources_, Source{});
 }
 
 double Clocks::usual_interval(const Source& source) const noexcept {
@@ -42,10 +39,10 @@ Clocks::Place Clocks::place(const Source& source, double time) const noexcept {
   if (std::isnan(now_)) return Place::in_order;
   if (time > now_ + room_ahead(source)) return Place::far_ahead;
   if (time < now_ - setup_.behind) return Place::far_behind;
-  const double usual = usual_interval(source);
-  if (std::isnan(source.newest) || time >= source.newest - 0.5 * usual) return Place::in_order;
+  const double usual = usual_interval(source), newest = source.rhythm.last();
+  if (std::isnan(newest) || time >= newest - 0.5 * usual) return Place::in_order;
   // Has the source delivered what lies between this time and its newest?
-  const double expected = (source.newest - time) / usual;
+  const double expected = (newest - time) / usual;
   const std::size_t known = std::min(source.count, remembered);
   const auto later = std::count_if(source.times.begin(), source.times.begin() + static_cast<std::ptrdiff_t>(known),
                                    [&](double other) { return other > time + 0.25 * usual; });
@@ -71,10 +68,7 @@ bool Clocks::is_within(const Source& source, double time) noexcept {
 }
 
 double Clocks::use(Source& source, double time) noexcept {
-  if (!(source.newest >= time)) {
-    source.rhythm.hear(time);
-    source.newest = time;
-  }
+  source.rhythm.hear(time);
   source.times[source.count++ % remembered] = time;
   if (!(now_ >= time)) now_ = time;
   return time;
@@ -94,7 +88,7 @@ void Clocks::suspect(Source& source, double stamp) noexcept {
 
 /// The first stamp by the new clock is an interval after the newest by the old one.
 double Clocks::set_clock(Source& source, double stamp) noexcept {
-  const double last = std::isnan(source.newest) ? now_ : source.newest;
+  const double last = std::isnan(source.rhythm.last()) ? now_ : source.rhythm.last();
   source.offset = source.first_suspect - (last + usual_interval(source));
   source.suspects = 0;
   ++settings_;

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 namespace rhec {
 namespace {
@@ -17,14 +16,18 @@ void Rhythm::hear(double time) noexcept {
   last_ = time;
   if (std::isnan(interval)) return;
   if (count_ > 0) deviation_ += to_new_deviation * (std::min(std::abs(interval - interval_), interval_) - deviation_);
-  intervals_[count_++ % remembered] = interval;
-  std::array<double, remembered> sorted = intervals_;
-  const std::size_t known = std::min(count_, remembered), left_out = known / 3;
-  std::sort(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(known));
-  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(left_out);
-  const std::size_t counted = known - 2 * left_out;
-  interval_ =
-      std::accumulate(middle, middle + static_cast<std::ptrdiff_t>(counted), 0.0) / static_cast<double>(counted);
+  // The new one takes the place of the oldest, from where it moves to its own.
+  double& oldest = intervals_[count_ % remembered];
+  const std::size_t known = std::min(count_ + 1, remembered), left_out = known / 3;
+  std::size_t at = count_ < remembered ? count_ : 0;
+  while (count_ >= remembered && sorted_[at] != oldest) ++at;
+  for (; at > 0 && sorted_[at - 1] > interval; --at) sorted_[at] = sorted_[at - 1];
+  for (; at + 1 < known && sorted_[at + 1] < interval; ++at) sorted_[at] = sorted_[at + 1];
+  sorted_[at] = oldest = interval;
+  ++count_;
+  interval_ = 0.0;
+  for (std::size_t i = left_out; i < known - left_out; ++i) interval_ += sorted_[i];
+  interval_ /= static_cast<double>(known - 2 * left_out);
 }
 
 }  // namespace rhec

@@ -124,10 +124,9 @@ SensorWatch::Finding SensorWatch::accuse(const Suspicion& suspicion, const Recor
 
 /// Whether another sensor that sees the position has passed its gate, and has not been silent for long since.
 bool SensorWatch::is_placed_by_other(int position) const noexcept {
-  const double now = heard_[static_cast<std::size_t>(position)];
   for (std::size_t s = 0; s < sensors_.size(); ++s)
     if (static_cast<int>(s) != position && sees_position(sensors_[s].outputs) && records_[s].failures == 0 &&
-        !std::isnan(heard_[s]) && !is_silent(s, now))
+        is_heard(s))
       return true;
   return false;
 }

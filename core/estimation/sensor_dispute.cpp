@@ -227,7 +227,7 @@ bool SensorWatch::may_follow() const noexcept {
   if (is_position_disputed()) return true;
   for (std::size_t s = 0; s < sensors_.size(); ++s) {
     const bool is_doubted = (findings_[s] & reason::rejected) != 0 || records_[s].failures > 0;
-    if (!is_doubted && !std::isnan(heard_[s]) && !is_silent(s, memory_->now)) return false;
+    if (!is_doubted && is_heard(s)) return false;
   }
   return true;
 }

@@ -280,9 +280,10 @@ bool SensorWatch::is_expected(std::size_t sensor) const noexcept {
   return std::ranges::any_of(sensors_[sensor].outputs, [&](int j) { return memory_->loss->is_expected(j); });
 }
 
-/// Whether a sensor has said nothing for long, up to a time; one that has never been heard has not.
-bool SensorWatch::is_silent(std::size_t sensor, double time) const noexcept {
-  return Memory::is_gap(time - heard_[sensor], memory_->loss->usual_interval(sensors_[sensor].outputs.front()));
+/// Whether a sensor has been measured lately, before the present sample or in it.
+bool SensorWatch::is_heard(std::size_t sensor) const noexcept {
+  const double usual = memory_->loss->usual_interval(sensors_[sensor].outputs.front());
+  return !std::isnan(heard_[sensor]) && !Memory::is_gap(memory_->now - heard_[sensor], usual);
 }
 
 /// Which sensors have come, or were to come. What is counted in samples counts those of the position, if there is one:
@@ -445,7 +446,7 @@ SensorWatch::Finding SensorWatch::judge(double time, double* outputs, const doub
 bool SensorWatch::admits(std::size_t sensor, const Innovation& innovation) noexcept {
   Record& record = records_[sensor];
   // What it was before a gap, as while it was stuck, says nothing of it afterwards.
-  const bool comes_back = is_silent(sensor, innovation.time);
+  const bool comes_back = !std::isnan(heard_[sensor]) && !is_heard(sensor);
   if (comes_back) record = {};
   const bool is_suspect = record.failures >= suspect_after;
   const auto degrees = static_cast<double>(innovation.value.size());

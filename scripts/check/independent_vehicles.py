@@ -16,7 +16,7 @@ TICK = 0.01  # [s] of the vehicle's motion
 class Sensor:
     """What a sensor says of a vehicle: values of `read`, wrong by these errors, every `every` ticks, `late` seconds later."""
     name: str
-    kind: str                # position, angle, rate, speed
+    kind: str                # position, angle or rate
     outputs: tuple           # of the model
     every: int               # [ticks]
     phase: int               # [ticks]

@@ -44,7 +44,7 @@ class RHEC_EXPORT Clocks {
   /// Usual interval of a source [s]; that of the set-up before its second stamp.
   double usual_interval(int source) const noexcept { return usual_interval(sources_[source]); }
   /// Newest time of a source on the timeline; NaN before its first.
-  double newest(int source) const noexcept { return sources_[source].newest; }
+  double newest(int source) const noexcept { return sources_[source].rhythm.last(); }
   /// Whether the source's last stamp was refused, or its clock has just been set.
   bool is_suspected(int source) const noexcept { return sources_[source].suspects > 0; }
   std::int64_t refused() const noexcept { return refused_; }
@@ -55,7 +55,7 @@ class RHEC_EXPORT Clocks {
  private:
   static constexpr std::size_t remembered = 128;
   struct Source {
-    double offset = 0.0, newest = 0.0;
+    double offset = 0.0;
     Rhythm rhythm;
     double first_suspect = 0.0, last_suspect = 0.0;  ///< stamps
     double suspect_interval = 0.0;                   ///< the last one

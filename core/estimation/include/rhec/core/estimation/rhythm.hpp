@@ -28,6 +28,7 @@ class RHEC_EXPORT Rhythm {
   static constexpr std::size_t remembered = 9;
   static constexpr double none = std::numeric_limits<double>::quiet_NaN();
   std::array<double, remembered> intervals_{};  ///< in a ring
+  std::array<double, remembered> sorted_{};     ///< the same
   std::size_t count_ = 0;
   double interval_ = none, deviation_ = 0.0, last_ = none;
 };

@@ -134,7 +134,7 @@ class RHEC_EXPORT SensorWatch {
   void find_stuck(double*outputs) noexcept, note_sample(double time, const double*outputs) noexcept;
   void note_motion(double duration, const double* inputs) noexcept;
   bool is_searching() const noexcept, is_expected(std::size_t sensor) const noexcept;
-  bool is_silent(std::size_t sensor, double time) const noexcept;
+  bool is_heard(std::size_t sensor) const noexcept;
   int offset_in_dispute() noexcept;
   void start_search(const double* outputs) noexcept;
   void search_from(WalkingFilter& filter, HeadingSearch& search) noexcept;
