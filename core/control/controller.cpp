@@ -500,7 +500,13 @@ const Controller::Command& Controller::control(const Estimate& estimate, Clock::
   has_plan_ = is_found || from_plan;
   if (!is_found) {
     // Continue the last plan, which the shifter still has; without one, go straight ahead along the path.
-    if (!from_plan || !shifter_.apply(1, problem_, point_)) start_cold();
+    if (!from_plan || !shifter_.apply(1, problem_, point_)) {
+      start_cold();
+    } else {
+      // Its inputs, from where the vehicle is: the limits that they keep are not those of the plan as it was.
+      roll_out(problem_, point_, scratch_);
+      if (!is_finite(problem_, point_)) shifter_.apply(1, problem_, point_);
+    }
     plan_inputs(0, command_.inputs.data());
   }
   command_.faces_away = faces_away();

@@ -128,8 +128,7 @@ double PathFollower::advance_with(const PathFollower& other, double x, double y)
     last_.arc_length = path_->section_start(section_);
   }
   project(x, y);
-  is_finished_ =
-      last_.arc_length >= path_->length() || (other.is_finished_ && path_->stops_after(path_->section_count() - 1));
+  is_finished_ = last_.arc_length >= path_->length();
   return last_.arc_length;
 }
 

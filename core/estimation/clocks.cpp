@@ -15,6 +15,11 @@ constexpr int confirm_gap = 2, confirm_clock = 3;
 // Going through known times again shows only if it lasts: single stamps are late for other reasons.
 constexpr int confirm_repetition = 4;
 constexpr double same_interval = 0.25;  // relative difference of two that are alike
+// A clock was set by little where a source's stamps, against those of all others, are off from where they usually are
+// by at least so much [s], and by so many times what they usually are, and stay there.
+constexpr double least_step = 0.15, unusual_lead = 8.0;
+constexpr double same_step = 0.3;  // relative difference of two that are alike
+constexpr int confirm_step = 3, lead_memory = 20, least_leads = 10;
 
 }  // namespace
 
@@ -86,13 +91,52 @@ void Clocks::suspect(Source& source, double stamp) noexcept {
   source.last_suspect = stamp;
 }
 
-/// The first stamp by the new clock is an interval after the newest by the old one.
+/// The first stamp by the new clock is an interval after the newest by the old one. Of a source that has always gone by
+/// another clock, what it says is as new as what the others say.
 double Clocks::set_clock(Source& source, double stamp) noexcept {
-  const double last = std::isnan(source.rhythm.last()) ? now_ : source.rhythm.last();
-  source.offset = source.first_suspect - (last + usual_interval(source));
-  source.suspects = 0;
+  const double last = source.rhythm.last();
+  source.offset = std::isnan(last) ? stamp - now_ : source.first_suspect - (last + usual_interval(source));
+  source.suspects = source.steps = 0;
   ++settings_;
   return use(source, stamp - source.offset);
+}
+
+/// The newest time of all others; NaN without any.
+double Clocks::newest_of_others(const Source& source) const noexcept {
+  double newest = unknown;
+  for (const Source& other : sources_)
+    if (&other != &source && !(other.rhythm.last() <= newest)) newest = other.rhythm.last();
+  return newest;
+}
+
+/// A step by less than a gap leaves every stamp where it may be. Of a message that was held up, lost or overtaken,
+/// stamps or the others' times do not go on by one interval; of a clock that was set, the others' do, the stamps jump
+/// by more or less, and later ones stay there.
+bool Clocks::follows_step(Source& source, double time, double others) noexcept {
+  const double usual = usual_interval(source), step = time - others - source.usual_lead;
+  const bool is_far =
+      source.leads >= least_leads && std::abs(step) > std::max(least_step, unusual_lead * source.lead_deviation);
+  const auto is_alike = [&](double other) { return std::abs(other - step) < same_step * std::abs(step); };
+  const double elapsed = others - source.last_others;
+  const bool is_next = elapsed > 0.5 * usual && elapsed < 1.5 * usual;
+  const bool follows =
+      is_far && is_next && is_alike(source.steps > 0 ? source.step : time - source.rhythm.last() - usual);
+  if (!follows) {
+    source.steps = 0;
+    return false;
+  }
+  ++source.steps;
+  source.step += (step - source.step) / source.steps;
+  return true;
+}
+
+void Clocks::note_lead(Source& source, double lead) noexcept {
+  if (std::isnan(lead)) return;
+  source.leads = std::min(source.leads + 1, lead_memory);
+  if (source.leads == 1) source.usual_lead = lead;
+  const double off = lead - source.usual_lead;
+  source.usual_lead += off / source.leads;
+  source.lead_deviation += (std::abs(off) - source.lead_deviation) / source.leads;
 }
 
 bool Clocks::take_over_offset(Source& source, double stamp) noexcept {
@@ -101,7 +145,7 @@ bool Clocks::take_over_offset(Source& source, double stamp) noexcept {
     const Place there = place(source, stamp - other.offset);
     if (there != Place::in_order) continue;
     source.offset = other.offset;
-    source.suspects = 0;
+    source.suspects = source.steps = 0;
     ++settings_;
     return true;
   }
@@ -116,8 +160,24 @@ double Clocks::take(int index, double stamp) noexcept {
   }
   const double time = stamp - source.offset;
   const Place there = place(source, time);
+  const double others = newest_of_others(source);
+  const bool is_near = there == Place::in_order || there == Place::late || there == Place::repeated;
+  const bool follows = is_near && follows_step(source, time, others);
+  source.last_others = others;
+  if (follows && source.steps >= confirm_step) {
+    source.offset += source.step;
+    source.steps = source.suspects = 0;
+    ++settings_;
+    return use(source, stamp - source.offset);
+  }
+  // Behind the others there is room for what is just late.
+  if (follows && source.step > 0.0) {
+    ++refused_;
+    return unknown;
+  }
   if (there == Place::in_order || there == Place::late) {
     source.suspects = 0;
+    if (there == Place::in_order) note_lead(source, time - others);
     return use(source, time);
   }
   if (take_over_offset(source, stamp)) return use(source, stamp - source.offset);

@@ -246,10 +246,14 @@ double Estimator::judged_until(double time) const noexcept {
   double until = time;
   const double now = std::max(time, newest_row_),
                longest = longest_wait * method_->most_reach() * timeline_.longest_interval;
+  double quickest = infinity;
+  for (std::size_t s = 0; s < deliveries_.size(); ++s)
+    quickest = std::min(quickest, clocks_->usual_interval(static_cast<int>(s)));
   for (std::size_t s = 0; s < deliveries_.size(); ++s) {
     const auto& [lag, newest] = deliveries_[s];
     const double interval = clocks_->usual_interval(static_cast<int>(s));
-    if (!(lag > least_lag * interval) || std::isnan(newest)) continue;
+    // What is late by less comes before the next one of any other sensor.
+    if (!(lag > std::min(least_lag * interval, 0.5 * quickest)) || std::isnan(newest)) continue;
     const double next = newest + soonest * interval, missed = newest + latest * interval + latest_lag * lag;
     if (missed - next < longest && now < missed) until = std::min(until, next);
   }
@@ -435,16 +439,16 @@ void Estimator::rebase(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covar
 SensorWatch::Finding Estimator::judge(double time, MeasuredOutputs& outputs, Clock::time_point deadline) noexcept {
   const double last = watched_;
   watched_ = time;
-  if (!has_started()) return {};
   const bool is_unknown = time - clocks_->newest(inputs_source()) > longest_silence(inputs_source());
-  through_motion(last, time, deadline, [&](double begin, double end) {
-    if (is_unknown) {
-      guess_input(last, begin, end);
-      watch_->advance(end - begin, input_.data(), input_sigmas_.data());
-    } else {
-      watch_->advance(end - begin, grid_.mean_input(begin, end));
-    }
-  });
+  if (has_started())
+    through_motion(last, time, deadline, [&](double begin, double end) {
+      if (is_unknown) {
+        guess_input(last, begin, end);
+        watch_->advance(end - begin, input_.data(), input_sigmas_.data());
+      } else {
+        watch_->advance(end - begin, grid_.mean_input(begin, end));
+      }
+    });
   const SensorWatch::Finding finding = watch_->judge(time, outputs.values(), outputs.measured().weights);
   counts_.rejected = 0;
   for (const SensorHealth& sensor : watch_->sensor_states()) counts_.rejected += sensor.rejected;
@@ -639,12 +643,14 @@ const Estimate& Estimator::estimate(double time, Clock::time_point deadline) noe
   if (watch_) estimate_.innovations = watch_->innovations();
   const bool is_ahead = std::isfinite(time) && time > newest + timeline_.tolerance;
   const bool is_in_doubt = watch_ && is_all_taken_in && watch_->is_in_doubt();
-  if (!is_ahead && !is_in_doubt) {
+  const double covariance_factor = watch_ ? watch_->covariance_factor() : 1.0;
+  if (!is_ahead && !is_in_doubt && covariance_factor == 1.0) {
     assess(estimate_, std::isfinite(time) ? time : newest);
     return estimate_;
   }
   predicted_ = estimate_;
   // What is given out alone: everything goes on from what the method says.
+  predicted_.covariance *= covariance_factor;
   if (is_in_doubt) {
     watch_->widen(predicted_);
     clip(predicted_);

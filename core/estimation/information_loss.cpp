@@ -95,6 +95,15 @@ void InformationLoss::note(double time, const double* measured) noexcept {
   }
 }
 
+void InformationLoss::note_late(double time, const double* measured) noexcept {
+  for (std::size_t j = 0; j < outputs_.size(); ++j) {
+    if (std::isnan(measured[j])) continue;
+    auto& [rhythm, counted] = outputs_[j];
+    rhythm.hear(time);
+    if (counted < time) counted = time;
+  }
+}
+
 void InformationLoss::update(const WalkingFilter& judge, Measured used) noexcept {
   bool is_lacking = false;
   for (std::size_t j = 0; j < expected_.size(); ++j)

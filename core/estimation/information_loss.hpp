@@ -30,6 +30,8 @@ class InformationLoss {
 
   /// A sample at a time [s] with these outputs (n_y, NaN where missing).
   void note(double time, const double* measured) noexcept;
+  /// These have come, too, behind samples that were noted before: they are not lacking.
+  void note_late(double time, const double* measured) noexcept;
   /// Whether an output has come with it, or was to come.
   bool is_expected(int output) const noexcept { return expected_[static_cast<std::size_t>(output)]; }
   /// Usual intervals of samples, and of those of an output [s]; NaN: not known.

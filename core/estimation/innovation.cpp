@@ -1,5 +1,6 @@
 #include "innovation.hpp"
 
+#include <cmath>
 #include <limits>
 
 #include <Eigen/Cholesky>
@@ -20,8 +21,13 @@ double squared_size(const Innovation::OfSensor<1>& value,
                  variance = covariance(1, 1) - by * covariance(1, 0);
     if (variance > 0.0) return value[0] * value[0] / covariance(0, 0) + rest * rest / variance;
   }
-  const Innovation::OfSensor<1> scaled = Root(covariance).matrixL().solve(value);
-  return scaled.squaredNorm();
+  return normalised(value, covariance).squaredNorm();
+}
+
+Innovation::OfSensor<1> normalised(const Innovation::OfSensor<1>& value,
+                                   const Innovation::OfSensor<Eigen::Dynamic>& covariance) noexcept {
+  if (value.size() == 1) return value / std::sqrt(covariance(0, 0));
+  return Root(covariance).matrixL().solve(value);
 }
 
 double log_determinant(const Innovation::OfSensor<Eigen::Dynamic>& covariance) noexcept {

@@ -355,7 +355,9 @@ void KalmanFilter::narrow() noexcept {
     for (Eigen::Index c = 0; c < a; ++c) next_[r] += transition_(r, c) * (wide_mean_[c] - point_[c]);
   for (int j = 0; j < np_; ++j) wide_end_[j] = wide_mean_[nx_ + j] + wide_mean_[n + nu_ + j];
   const bool finite = std::all_of(next_.begin(), next_.end(), [](double value) { return std::isfinite(value); });
-  if (!finite || !next_covariance_.allFinite() || !wide_end_.allFinite()) return;
+  // Of numbers that are far too large rounding leaves no covariance.
+  const bool is_covariance = next_covariance_.allFinite() && next_covariance_.diagonal().minCoeff() >= 0.0;
+  if (!finite || !is_covariance || !wide_end_.allFinite()) return;
   make_symmetric();
   std::copy(next_.begin(), next_.end(), mean.data());
   std::copy_n(wide_end_.data(), np_, mean.data() + nx_);

@@ -12,11 +12,13 @@ namespace rhec {
 namespace {
 
 constexpr double volume_memory = 10.0;  // that the usual volume is a mean over so many estimates before
+constexpr double typical_volume_memory = 300.0;
 
 }  // namespace
 
 void SensorWatch::judge_late(double time, double* outputs, const double* weights) noexcept {
   if (!is_active_) return;
+  memory_->loss->note_late(time, outputs);
   memory_->offsets->correct(outputs);
   const Memory::Entry* last = nullptr;
   const auto known = static_cast<std::size_t>(std::min<std::int64_t>(memory_->count, Memory::remembered_samples));
@@ -75,7 +77,14 @@ void SensorWatch::follow(const Estimate& estimate) noexcept {
   const int heading = model.description().roles.heading;
   if (!is_active_) {
     if (!(estimate.covariance.diagonal().maxCoeff() > 0.0)) return;  // of one that is not estimated
-    if (heading >= 0 && estimate.covariance(heading, heading) > Memory::known_heading * Memory::known_heading) return;
+    const bool is_known =
+        heading < 0 || !(estimate.covariance(heading, heading) > Memory::known_heading * Memory::known_heading);
+    if (!is_known) {
+      own_->filter.mean().head(nx) = estimate.state;
+      own_->filter.mean().tail(np) = estimate.parameters;
+      copy_numbers(estimate.covariance, own_->filter.covariance());
+      return;
+    }
     is_active_ = true;
   }
   note_volume(estimate);
@@ -83,6 +92,23 @@ void SensorWatch::follow(const Estimate& estimate) noexcept {
   own_->filter.mean().head(nx) = estimate.state;
   own_->filter.mean().tail(np) = estimate.parameters;
   copy_numbers(estimate.covariance, own_->filter.covariance());
+}
+
+double SensorWatch::covariance_factor() const noexcept { return memory_->covariance_factor; }
+
+/// What is learnt from correlated innovations is less than the estimate believes. Where it knows less than usual, as
+/// after a jump, that is what is missing; and of this it is right.
+void SensorWatch::Memory::note_whiteness(double volume, Eigen::Index size) noexcept {
+  double most = 1.0;
+  for (const InnovationWhiteness& each : whiteness) most = std::max(most, each.factor());
+  if (std::isfinite(volume)) {
+    volumes = std::min(volumes + 1.0, typical_volume_memory);
+    typical_volume += (volume - typical_volume) / volumes;
+  }
+  covariance_factor = most;
+  if (most == 1.0 || !(volume > typical_volume)) return;
+  const double excess = 2.0 * (volume - typical_volume) / static_cast<double>(size);
+  covariance_factor = 1.0 + (most - 1.0) * std::exp(-excess);
 }
 
 bool SensorWatch::is_in_doubt() const noexcept { return slip_probability_ > 0.0 || memory_->offsets->is_in_doubt(); }
@@ -115,8 +141,9 @@ void SensorWatch::widen(Estimate& estimate) noexcept {
 
 /// What volume is usual is learnt where nothing is lacking.
 void SensorWatch::note_volume(const Estimate& estimate) noexcept {
-  if (memory_->loss->is_active()) return;
   const double volume = log_volume(estimate.covariance, memory_->factor);
+  memory_->note_whiteness(volume, estimate.covariance.rows());
+  if (memory_->loss->is_active()) return;
   if (std::isnan(usual_volume_))
     usual_volume_ = volume;
   else if (!std::isnan(volume))
@@ -128,6 +155,7 @@ void SensorWatch::assess(const Estimate& estimate, std::span<const Presence> pre
   health.reasons = reasons;
   health.sensors.assign(states_.begin(), states_.end());
   health.inputs = inputs_;
+  health.covariance_factor = covariance_factor();
   bool has_finding = reasons != 0 || calm_samples_ < setup_.calm || inputs_.reasons != 0;
   bool is_overdue = are_inputs_overdue;
   for (std::size_t s = 0; s < sensors_.size(); ++s) {
@@ -140,22 +168,26 @@ void SensorWatch::assess(const Estimate& estimate, std::span<const Presence> pre
   if (is_searching()) health.reasons |= reason::uncertain;
   bool is_lost = (reasons & reason::starting) != 0;
   if (P.rows() > 0) {
-    double variance = 0.0;
-    for (const int i : {roles.position_x, roles.position_y})
-      if (i >= 0) variance = std::max(variance, P(i, i));
-    const bool is_place_known = variance <= setup_.lost_position * setup_.lost_position;
-    const bool is_heading_known =
-        roles.heading < 0 || P(roles.heading, roles.heading) <= setup_.lost_heading * setup_.lost_heading;
+    // What is no variance says that nothing is known. What correlated innovations add to it is no reason to stop.
+    const auto is_known = [&](int i, double limit) {
+      if (i < 0) return true;
+      const double added = (health.covariance_factor - 1.0) * std::max(0.0, own_->filter.covariance()(i, i));
+      return P(i, i) >= 0.0 && P(i, i) - added <= limit * limit;
+    };
+    const bool is_place_known =
+        is_known(roles.position_x, setup_.lost_position) && is_known(roles.position_y, setup_.lost_position);
+    const bool is_heading_known = is_known(roles.heading, setup_.lost_heading);
     if (!is_place_known || !is_heading_known) {
       health.reasons |= reason::uncertain;
       is_lost = true;
     }
     const InformationLoss& loss = *memory_->loss;
+    const double in_volume = 0.5 * static_cast<double>(P.rows()) * std::log(health.covariance_factor);
     // Where a sensor has a finding, all is said; a single sample that does not come is not worth a word.
     const bool has_lost = loss.samples_above() > 1 && loss.samples_since() <= setup_.calm && !memory_->was_open;
     if ((has_lost && !has_finding) ||
         (is_overdue && P.rows() == own_->filter.mean().size() &&
-         log_volume(P, memory_->factor) > usual_volume_ + std::log(InformationLoss::most_volume))) {
+         log_volume(P, memory_->factor) - in_volume > usual_volume_ + std::log(InformationLoss::most_volume))) {
       health.reasons |= reason::uncertain;
       has_finding = true;
     }

@@ -96,6 +96,11 @@ SensorWatch::SensorWatch(std::shared_ptr<const Model> model, const Setup& setup)
   if (setup_.walk.size() != np || setup_.parameter_sigmas.size() != np)
     throw Error(fmt::format("sensor watch: {} walks and {} standard deviations of parameters; expected {} of each",
                             setup_.walk.size(), setup_.parameter_sigmas.size(), np));
+  const Eigen::Index size = model->state_count() + model->parameter_count();
+  const Eigen::MatrixXd& initial = setup_.initial_covariance;
+  if (initial.size() > 0 && (setup_.initial_mean.size() != size || initial.rows() != size || initial.cols() != size))
+    throw Error(fmt::format("sensor watch: an initial mean of {} values, and a covariance of {} x {}; expected {}",
+                            setup_.initial_mean.size(), initial.rows(), initial.cols(), size));
   for (int degrees = 0; degrees <= most_sensor_outputs; ++degrees) {
     limits_.push_back(degrees ? chi_square_limit(degrees, setup_.gate) : 0.0);
     close_limits_.push_back(degrees ? chi_square_limit(degrees, std::min(setup_.gate, close_gate)) : 0.0);
@@ -173,6 +178,13 @@ void SensorWatch::reset() noexcept {
   memory_->count = memory_->connected = 0;
   memory_->has_advanced = false;
   memory_->offsets->reset();
+  memory_->whiteness.assign(setup_.whiteness ? sensors_.size() : 0, {});
+  if (setup_.initial_covariance.size() > 0) {
+    own_->filter.mean() = setup_.initial_mean;
+    own_->filter.covariance() = setup_.initial_covariance;
+  }
+  memory_->covariance_factor = 1.0;
+  memory_->typical_volume = memory_->volumes = 0.0;
   memory_->stuck.reset();
   memory_->beyond_bounds = 0.0;
   memory_->impossible_samples = 0;
@@ -211,7 +223,10 @@ void SensorWatch::clean_inputs(double* inputs) noexcept {
 }
 
 void SensorWatch::advance(double duration, const double* inputs, const double* more_sigmas) noexcept {
-  if (!is_active_) return;
+  if (!is_active_) {
+    own_->filter.predict(inputs, duration, more_sigmas);
+    return;
+  }
   if (!is_searching()) memory_->loss->predict(own_->filter, inputs, duration, more_sigmas);
   if (more_sigmas) {
     // Nobody knows how the vehicle has moved: what follows starts from here.
@@ -331,6 +346,7 @@ SensorWatch::Finding SensorWatch::judge(double time, double* outputs, const doub
       heard_[s] = time;
       if (innovation.accepted) {
         ++states_[s].accepted;
+        if (setup_.whiteness) memory_->whiteness[s].take(innovation, sensors_[s].outputs.size());
         is_placed = is_placed || sees_position(sensors_[s].outputs);
         continue;
       }
@@ -418,6 +434,7 @@ SensorWatch::Finding SensorWatch::judge(double time, double* outputs, const doub
     note_corrected(finding.rebase || finding.release);
     remember(time, outputs);
   }
+  if (!is_active_) finding = place_start(outputs);
   note_offsets();
   if (is_blind_) input_findings_ |= reason::rejected;
   bool is_calm = input_findings_ == 0;

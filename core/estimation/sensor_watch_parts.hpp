@@ -12,6 +12,7 @@
 
 #include "heading_search.hpp"
 #include "information_loss.hpp"
+#include "innovation_whiteness.hpp"
 #include "log_volume.hpp"
 #include "numbers.hpp"
 #include "offset_watch.hpp"
@@ -143,6 +144,10 @@ struct SensorWatch::Memory {
   double slip_beyond = 0.0;
   StuckValues stuck;
   std::unique_ptr<OffsetWatch> offsets;
+  std::vector<InnovationWhiteness> whiteness;  ///< by sensor; empty: not watched
+  double covariance_factor = 1.0;
+  double typical_volume = 0.0, volumes = 0.0;  ///< mean log sqrt(det P) over so many estimates
+  void note_whiteness(double volume, Eigen::Index size) noexcept;
   std::unique_ptr<InformationLoss> loss;
   std::unique_ptr<WalkingFilter> trial;   ///< for what is tried within one call
   std::unique_ptr<WalkingFilter> ahead;   ///< behind the last sample that was judged

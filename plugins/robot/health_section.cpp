@@ -16,6 +16,9 @@ const OptionTable<HealthOptions>& HealthOptions::table() {
           .flag("offsets", &H::offsets,
                 "whether angles and the like that are off by little for long are found, and what they are off by taken "
                 "out of what is measured")
+          .flag("whiteness", &H::whiteness,
+                "whether the covariance that is given out is larger where innovations are correlated, as by errors "
+                "that last and what a model does not have")
           .number("gate", &H::gate, "a measurement that is less probable than so many standard deviations is not used",
                   or_infinite(greater_than(0.0)))
           .integer("proof", &H::proof, "samples that a sensor must have jumped for before the estimate follows it",
@@ -38,10 +41,13 @@ std::unique_ptr<SensorWatch> make_watch(const HealthOptions& options, const Esti
   const Eigen::Index nx = context.model->state_count(), np = context.model->parameter_count();
   for (Eigen::Index j = 0; j < np; ++j)
     setup.parameter_sigmas.push_back(std::sqrt(parts.initial_covariance(nx + j, nx + j)));
+  setup.initial_mean = parts.initial_mean;
+  setup.initial_covariance = parts.initial_covariance;
   setup.has_ramps = senses_motion(*context.model);
   setup.step = context.step;
   setup.substeps = parts.substeps;
   setup.offsets = options.offsets;
+  setup.whiteness = options.whiteness;
   setup.gate = options.gate;
   setup.proof = options.proof;
   setup.lost_position = options.lost_position;

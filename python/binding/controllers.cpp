@@ -115,9 +115,23 @@ int set_obstacles(ControllerObject& self, const Numbers& obstacles, double time)
   std::vector<Obstacle> all;
   for (py::ssize_t i = 0; i < obstacles.shape(0); ++i) {
     const double* row = obstacles.data() + i * width;
+    if (row[2] < 0.0 || row[3] < 0.0)
+      throw Error(
+          fmt::format("obstacles: row {} has the semi-axes {} and {} m; expected at least 0", i, row[2], row[3]));
     all.push_back({row[0], row[1], row[2], row[3], row[4], row[5], row[6]});
   }
   return locked(self, [&](Controller& controller) { return controller.set_obstacles(all, time); });
+}
+
+/// By name.
+py::dict violations(ControllerObject& self) {
+  const ControllerLock lock(self);
+  self.controller->finish();
+  py::dict found;
+  const TermFunctions* const terms = self.controller->problem().terms().functions();
+  const std::vector<double>& values = self.controller->command().violations;
+  for (std::size_t j = 0; j < values.size(); ++j) found[py::str(terms->limit_names()[j])] = values[j];
+  return found;
 }
 
 /// What is planned: times from now, and the vehicle's states and inputs.
@@ -215,6 +229,10 @@ void bind_controllers(py::module_& module) {
       .def(
           "finish", [](ControllerObject& self) { locked(self, [](Controller& c) { c.finish(); }); },
           "Assesses the last plan; `prepare` and the next `control` do that, too.")
+      .def("violations", &violations,
+           "By limit of the terms, how far what follows the last command is beyond it, in the limit's unit; 0: it is "
+           "kept.\n"
+           "Looks at the next sampling interval alone. Does what `finish` does, which takes a moment.")
       .def("applied", &applied, py::arg("inputs"),
            "Says which inputs, (n_u), the vehicle has had, where they were not the command.")
       .def(

@@ -18,6 +18,7 @@ namespace {
 
 /// Rounds off the tip that the distance from the centre has there, as a share of the obstacle.
 constexpr double rounding = 0.1;
+constexpr double least_semi_axis = 0.01;  // [m]
 
 /// An obstacle as it is written in a configuration.
 struct GivenObstacle {
@@ -107,8 +108,9 @@ class Obstacles final : public Term {
     std::fill_n(upper, most_, infinity);
     int k = 0;
     const auto add = [&](const Obstacle& obstacle, double seconds) {
-      const double a = obstacle.semi_axis_along + options_.vehicle_radius;
-      const double b = obstacle.semi_axis_across + options_.vehicle_radius;
+      // A point is in the way of a vehicle that is one.
+      const double a = std::max(least_semi_axis, std::max(0.0, obstacle.semi_axis_along) + options_.vehicle_radius);
+      const double b = std::max(least_semi_axis, std::max(0.0, obstacle.semi_axis_across) + options_.vehicle_radius);
       const double sine = std::sin(obstacle.heading), cosine = std::cos(obstacle.heading);
       const double numbers[numbers_each] = {obstacle.x + seconds * obstacle.velocity_x,
                                             obstacle.y + seconds * obstacle.velocity_y,

@@ -130,6 +130,7 @@ def test_the_argument_is_named():
 @pytest.mark.parametrize("call, word", [
     (lambda d: d.controller.applied([numpy.nan, 1]), "inputs: found a number that is not finite"),
     (lambda d: d.controller.set_obstacles(numpy.full((1, 7), numpy.nan), 0.0), "obstacles, time: found a number that is not finite"),
+    (lambda d: d.controller.set_obstacles([[1, 0, 1, 1, 0, 0, 0], [5, 0, 1, -1, 0, 0, 0]], 0.0), "obstacles: row 1 has the semi-axes 1 and -1 m; expected at least 0"),
     (lambda d: d.controller.set_obstacles(numpy.zeros((1, 7)), numpy.inf), "obstacles, time: found a number that is not finite"),
     (lambda d: d.robot.vehicle.integrate(ZEROS, ONES, ONES, numpy.inf), "duration: expected a finite number"),
     (lambda d: line().at(numpy.nan), "arc_length: expected a finite number"),

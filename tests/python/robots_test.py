@@ -113,6 +113,16 @@ def test_results_that_are_reused():
         wide.estimate(0.0, out=estimate)
 
 
+def test_limits_that_are_not_kept_are_told():
+    terms = [{"name": "obstacles", "most": 1, "vehicle_radius": 0.2}]
+    driven = Driven(rhec.Robot({"model": "bicycle_slip", "controller": {"terms": terms}}))
+    driven.step()
+    assert driven.controller.violations() == {"obstacles: obstacle 1": 0.0}
+    assert driven.controller.set_obstacles([[*driven.state[:2], 1.0, 1.0, 0.0, 0.0, 0.0]], driven.time) == 1
+    driven.step()
+    assert 0.1 < driven.controller.violations()["obstacles: obstacle 1"] < 1.5
+
+
 def test_what_a_controller_plans_and_says():
     driven = Driven()
     for _ in range(3):
@@ -124,6 +134,7 @@ def test_what_a_controller_plans_and_says():
     assert command.report.status in ("solved", "step_taken")
     assert driven.controller.fallbacks == 0
     assert driven.controller.set_obstacles(numpy.zeros((0, 7)), 0.0) == 0
+    assert driven.controller.violations() == {}
     driven.controller.applied([1.0, 0.0])
     driven.controller.locate()
     driven.controller.reset()

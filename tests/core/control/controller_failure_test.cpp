@@ -223,6 +223,8 @@ TEST_P(EveryFailure, OfTheFreshStartTooLetsTheLastPlanGoOnToItsEnd) {
     EXPECT_EQ(drive.controller->fallbacks(), k);
     EXPECT_EQ(failed.inputs, plan[std::min(k, intervals - 1)]) << k;
     EXPECT_TRUE(is_finite(drive.controller->problem(), drive.controller->plan())) << k;
+    for (int i = 0; i < 4; ++i)
+      EXPECT_EQ(drive.controller->plan().state(0)[i], drive.now.state[i]) << "it begins there";
     drive.drive(failed.inputs, prepares());
     EXPECT_TRUE(failed.fallback) << "finish, which prepare calls, has nothing to add";
   }

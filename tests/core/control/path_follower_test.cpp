@@ -255,6 +255,19 @@ TEST(PathFollower, OneFollowsTheSectionsOfAnother) {
   EXPECT_NEAR(other.arc_length(), 10.4, 1e-9);
 }
 
+/// Whoever takes itself to be at the end of the path does not take others there.
+TEST(PathFollower, OneFinishesByItsOwnPlace) {
+  const Path path({{0.0, 0.0, 1.0}, {10.0, 0.0, 1.0}, {20.0, 0.0, 0.0}});
+  PathFollower leader(path), other(path);
+  for (double x = 0.0; x <= 20.0; x += 0.5) {
+    leader.advance(x, 0.0);
+    other.advance_with(leader, 0.5 * x, 0.0);
+  }
+  EXPECT_TRUE(leader.finished());
+  EXPECT_FALSE(other.finished());
+  EXPECT_NEAR(other.arc_length(), 10.0, 1e-9);
+}
+
 TEST(PathFollower, RefusesStopsThatAreNeverReached) {
   const Path path = corner();
   EXPECT_THROW(PathFollower(path, {.stop_distance = -1.0}), Error);

@@ -68,6 +68,83 @@ TEST_F(TwoClocks, TheClockOfOneSourceAloneIsSet) {
   EXPECT_NEAR(clocks.take(0, time - 500.0), time, 0.11);
 }
 
+/// A source that goes by another clock from its first stamp on is not older than the others.
+TEST_F(TwoClocks, ASourceWithAnotherEpochIsAsNewAsTheOthers) {
+  for (const double interval : {0.1, 0.2, 1.0}) {
+    clocks.reset();
+    double time = 10.0, next = 10.0, place = nan;
+    for (int k = 0; k < 100; ++k, time += 0.1) {
+      clocks.take(1, time);
+      if (time < next - 1e-6) continue;
+      place = clocks.take(0, 1.7e9 + time);
+      next += interval;
+      if (k > 50) {
+        EXPECT_NEAR(place, time, 0.01) << interval;
+      }
+    }
+    EXPECT_EQ(clocks.settings(), 1);
+  }
+}
+
+/// Half a second is no gap, and less than five intervals of a receiver at 5 Hz.
+TEST(ClocksOfSensors, AreSetByLittle) {
+  std::mt19937 random(11);
+  std::normal_distribution<double> normal;
+  for (const double step : {0.3, 0.5, 1.0, -0.3, -0.5, -1.0}) {
+    for (const double interval : {0.1, 0.2, 1.0}) {
+      Clocks clocks{3, {.usual_interval = 0.1, .behind = 3.0, .longest_gap = 60.0}};
+      // Delivered late, by 0.1 s and a jitter of 5 ms; encoder and inputs at 20 Hz.
+      int messages = 0, wrong = 0;
+      double last = 0.0;
+      for (int tick = 0; tick < 3000; ++tick) {
+        const double time = 0.05 * tick;
+        clocks.take(1, time);
+        clocks.take(2, time);
+        const double measured = time - 0.1 + 0.005 * normal(random);
+        if (measured < last + interval - 0.02) continue;
+        last = measured;
+        const bool is_set = time > 60.0;
+        const double place = clocks.take(0, measured + (is_set ? step : 0.0));
+        messages += is_set;
+        if (!is_set || messages > 5) {
+          EXPECT_NEAR(place, measured, 0.06) << step << " s, every " << interval << " s, at " << time;
+          wrong += !(std::abs(place - measured) < 0.06);
+        }
+        if (wrong > 3) break;
+      }
+      EXPECT_EQ(clocks.settings(), 1) << step << " s, every " << interval << " s";
+    }
+  }
+}
+
+/// Messages that are lost, held up, or come in bursts do not set a clock; nor does it matter if the others are silent.
+TEST(ClocksOfSensors, AreNotSetByWhatHappensToMessages) {
+  std::mt19937 random(12);
+  std::uniform_real_distribution<double> uniform;
+  std::normal_distribution<double> normal;
+  Clocks clocks{3, {.usual_interval = 0.1, .behind = 3.0, .longest_gap = 60.0}};
+  struct Message {
+    double arrival, stamp;
+    int source;
+  };
+  std::vector<Message> messages;
+  double held_until = 0.0, others_from = 0.0;
+  for (int tick = 0; tick < 60000; ++tick) {
+    const double time = 0.05 * tick;
+    if (uniform(random) < 0.003) held_until = time + 1.5 * uniform(random);
+    if (uniform(random) < 0.003) others_from = time + 1.5 * uniform(random);
+    const double late = 0.1 + std::abs(0.02 * normal(random));
+    if (tick % 4 == 0 && uniform(random) < 0.9) messages.push_back({std::max(time + late, held_until), time, 0});
+    if (time < others_from) continue;
+    messages.push_back({time + 0.002, time, 1});
+    messages.push_back({time + 0.01 * uniform(random), time, 2});
+  }
+  std::ranges::stable_sort(messages, {}, &Message::arrival);
+  for (const Message& each : messages) clocks.take(each.source, each.stamp);
+  EXPECT_EQ(clocks.settings(), 0);
+  EXPECT_LT(clocks.refused(), 30);
+}
+
 TEST_F(TwoClocks, AGapIsAGap) {
   const double time = run(10.0, 50) + 20.0;
   EXPECT_TRUE(std::isnan(clocks.take(0, time)));

@@ -34,6 +34,7 @@ struct Timing {
   double lateness = 0.0;         ///< of positions [s]
   int ticks = 20;                ///< of 10 ms, from one position to the next
   double lateness_inputs = 0.0;  ///< [s]
+  double jitter = 0.0;           ///< standard deviation of what positions are later than that [s]
 };
 struct Sample {
   double error;  ///< of the position [m]
@@ -51,6 +52,7 @@ Result drive(const char* estimator_name, const Timing& timing, const Fault& faul
   const Robot robot = watched_robot(estimator_name);
   constexpr double step = 0.01;
   std::mt19937_64 random(11);
+  std::mt19937_64 random_lateness(12);
   std::normal_distribution<double> noise;
   Eigen::Vector4d truth = Eigen::Vector4d::Zero();
   const auto estimator = robot.make_estimator(truth);
@@ -67,8 +69,9 @@ Result drive(const char* estimator_name, const Timing& timing, const Fault& faul
       if (is_on && fault.spoil) fault.spoil(since, messages.back());
     };
     if (i % timing.ticks == 0)
-      send(time + timing.lateness, {truth[0] - antenna * std::cos(truth[2]) + 0.03 * noise(random),
-                                    truth[1] - antenna * std::sin(truth[2]) + 0.03 * noise(random), nan});
+      send(time + timing.lateness + timing.jitter * std::abs(noise(random_lateness)),
+           {truth[0] - antenna * std::cos(truth[2]) + 0.03 * noise(random),
+            truth[1] - antenna * std::sin(truth[2]) + 0.03 * noise(random), nan});
     if (i % 5 == 1) send(time, {nan, nan, truth[3] + 0.017 * noise(random)});
     if (i % 20 == 0) inputs.push_back({time, {speed + 0.1 * noise(random), steering * 0.4 + 0.1 * noise(random)}});
     const double v = kappa * speed * (is_on ? 1.0 - fault.lost_speed : 1.0);
@@ -186,6 +189,16 @@ TEST(SlowReceivers, ThatAreLateAreNoReasonForDoubt) {
         for (std::size_t k = 120; k < slow.samples.size(); ++k) EXPECT_EQ(slow.samples[k].words, "ok") << k;
         EXPECT_EQ(slow.counts.dropped, 0);
       }
+}
+
+/// Late by about as much as an encoder's interval: whether it is waited for or not, it has come.
+TEST(SlowReceivers, ThatAreLateByLittleHaveCome) {
+  for (const char* estimator : {"ekf", "bank", "rhe"})
+    for (const double lateness : {0.03, 0.06, 0.09}) {
+      SCOPED_TRACE(fmt::format("{}, {} s late", estimator, lateness));
+      const Result slow = drive(estimator, {.lateness = lateness, .ticks = 100, .jitter = 0.02}, faults[0]);
+      for (std::size_t k = 120; k < slow.samples.size(); ++k) EXPECT_EQ(slow.samples[k].words, "ok") << k;
+    }
 }
 
 }  // namespace estimator_late_sensor_test

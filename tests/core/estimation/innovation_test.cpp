@@ -23,6 +23,7 @@ TEST(Innovation, HasTheSizeAndTheVolumeThatEliminationFinds) {
     const Eigen::FullPivLU<Eigen::MatrixXd> elimination{Eigen::MatrixXd(S)};
     const double size = nu.dot(elimination.solve(Eigen::VectorXd(nu)));
     EXPECT_NEAR(squared_size(nu, S), size, 1e-10 * size) << n << " outputs";
+    EXPECT_NEAR(normalised(nu, S).squaredNorm(), size, 1e-10 * size) << n << " outputs";
     EXPECT_NEAR(log_determinant(S), std::log(elimination.determinant()), 1e-10) << n << " outputs";
   }
 }

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <fstream>
 #include <string>
 #include <vector>
 
@@ -98,6 +99,13 @@ terrain: {name: constant, values: {kappa: 0.87, mu: 1}}
   const RunLog log = run_closed_loop({Host(), settings});
   EXPECT_FALSE(log.completed);
   EXPECT_THAT(log.ended, testing::HasSubstr("takes itself to be at the end of the path, and is "));
+  // Nor if the path ends in a stop.
+  const std::string file = testing::TempDir() + "/ends_in_a_stop.csv";
+  std::ofstream(file) << "x,y,speed\n0,0,4\n60,0,4\n80,0,0\n";
+  apply_assignment(settings, "path={name: file, file: " + file + "}");
+  const RunLog stopped = run_closed_loop({Host(), settings});
+  EXPECT_FALSE(stopped.completed);
+  EXPECT_THAT(stopped.ended, testing::HasSubstr("takes itself to be at the end of the path, and is "));
 }
 
 TEST(Headlands, AreDrivenInReverse) {

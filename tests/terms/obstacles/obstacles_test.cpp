@@ -51,6 +51,19 @@ TEST(Obstacles, ThatAreSeenAtRunTimeTakeTheRestOfTheRoom) {
   EXPECT_TRUE(std::isfinite(two.values[2]));
 }
 
+/// A measured size may be nonsense: what is there is in the way, and not the place for the vehicle to be.
+TEST(Obstacles, OfNoSizeAreSmall) {
+  for (const double size : {0.0, -1.0, -0.5}) {
+    const std::vector<Obstacle> seen = {{.x = 5.0, .semi_axis_along = size, .semi_axis_across = size}};
+    for (const char* options : {"{vehicle_radius: 0.5, most: 1}", "{vehicle_radius: 0, most: 1}"}) {
+      const At centre = at(options, {5.0, 0.0}, {.obstacles = seen}),
+               beside = at(options, {5.0, 0.6}, {.obstacles = seen});
+      EXPECT_LT(centre.inside(0), 0.0) << options << " " << size;
+      EXPECT_GT(beside.inside(0), 0.05) << options << " " << size;
+    }
+  }
+}
+
 TEST(Obstacles, AreRefusedInWords) {
   EXPECT_THAT(error_of([] { make("obstacles", "{obstacles: {x: 1}}"); }), HasSubstr("a list of obstacles"));
   EXPECT_THAT(error_of([] { make("obstacles", "{obstacles: [{x: 1, radus: 1}]}"); }),

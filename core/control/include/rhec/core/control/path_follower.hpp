@@ -26,7 +26,8 @@ class RHEC_EXPORT PathFollower {
   /// Moves to the closest point of the window and returns its arc length [m]: at least 0, and more than the path's
   /// length once the end is passed. Stays at its place if the position is not finite.
   double advance(double x, double y) noexcept;
-  /// The same, but leaves a section only when `other`, of the same path, has left it.
+  /// The same, but leaves a section only when `other`, of the same path, has left it; finished is what has passed the
+  /// path's end itself, for where it stops is for `other` to say.
   double advance_with(const PathFollower& other, double x, double y) noexcept;
   /// Moves to where on the whole path the vehicle is (Path::locate). Stays if the position is not finite.
   void locate(double x, double y, double heading) noexcept;

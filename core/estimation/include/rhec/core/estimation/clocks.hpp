@@ -18,7 +18,8 @@ namespace rhec {
 /// source's stamps then go on from where they were, and its clock's offset is kept; other sources whose clock was
 /// set alike take it over at once. A source whose clock is set back by less than `behind` is recognised by going
 /// through times again for which it has delivered already; data that were only held up, or that come in another
-/// order, fill a gap that is wider than usual.
+/// order, fill a gap that is wider than usual. A step by less than that is recognised where the stamps of a source jump
+/// against those of all others, by as much as their own interval is off, and the next two stay there.
 ///
 /// Timeline and stamps in seconds. Allocates in its constructor only.
 class RHEC_EXPORT Clocks {
@@ -46,7 +47,7 @@ class RHEC_EXPORT Clocks {
   /// Newest time of a source on the timeline; NaN before its first.
   double newest(int source) const noexcept { return sources_[source].rhythm.last(); }
   /// Whether the source's last stamp was refused, or its clock has just been set.
-  bool is_suspected(int source) const noexcept { return sources_[source].suspects > 0; }
+  bool is_suspected(int source) const noexcept { return sources_[source].suspects > 0 || sources_[source].steps > 0; }
   std::int64_t refused() const noexcept { return refused_; }
   /// How often a clock was set.
   std::int64_t settings() const noexcept { return settings_; }
@@ -60,6 +61,11 @@ class RHEC_EXPORT Clocks {
     double first_suspect = 0.0, last_suspect = 0.0;  ///< stamps
     double suspect_interval = 0.0;                   ///< the last one
     int suspects = 0;
+    // By how much it usually is ahead of all others when it delivers, and how far it is from that [s].
+    double usual_lead = 0.0, lead_deviation = 0.0, last_others = 0.0;
+    int leads = 0;
+    double step = 0.0;                       ///< by which its clock may have been set [s]
+    int steps = 0;                           ///< stamps in a row that say so
     std::array<double, remembered> times{};  ///< of its newest stamps, in a ring
     std::size_t count = 0;
   };
@@ -72,6 +78,9 @@ class RHEC_EXPORT Clocks {
   double use(Source& source, double time) noexcept;
   void suspect(Source& source, double stamp) noexcept;
   double set_clock(Source& source, double stamp) noexcept;
+  double newest_of_others(const Source& source) const noexcept;
+  bool follows_step(Source& source, double time, double others) noexcept;
+  void note_lead(Source& source, double lead) noexcept;
   bool take_over_offset(Source& source, double stamp) noexcept;
 
   Setup setup_;

@@ -48,6 +48,8 @@ struct Health {
   std::uint32_t reasons = 0;          ///< that belong to no sensor
   std::vector<SensorHealth> sensors;  ///< as `sensors_of`; empty where nobody judges
   SensorHealth inputs;                ///< the measured inputs as a whole
+  /// By how much larger the covariance that is given out is than the estimator's own, since innovations are correlated.
+  double covariance_factor = 1.0;
 };
 
 /// What a measurement of a sensor differed by from what was expected, nu = y - h(x), before it was used.

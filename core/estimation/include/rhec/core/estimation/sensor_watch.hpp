@@ -95,6 +95,8 @@ class RHEC_EXPORT SensorWatch {
   /// with an input (n_u), each of which may be off by `input_sigmas` besides its noise (n_u, or null).
   void predict(double duration, const double* inputs, const double* input_sigmas, Estimate& estimate) noexcept;
 
+  /// By how much larger a covariance is to be, since innovations are correlated (Health::covariance_factor).
+  double covariance_factor() const noexcept;
   /// Whether estimates are to be widened: slip may have jumped, or a sensor is off.
   bool is_in_doubt() const noexcept;
   /// Gives an estimate at the last sample the covariance that it has if slip may have jumped, with the probability w
@@ -133,13 +135,12 @@ class RHEC_EXPORT SensorWatch {
   Measured weighed(const double* outputs) const noexcept;
   void find_stuck(double*outputs) noexcept, note_sample(double time, const double*outputs) noexcept;
   void note_motion(double duration, const double* inputs) noexcept;
-  bool is_searching() const noexcept, is_expected(std::size_t sensor) const noexcept;
-  bool is_heard(std::size_t sensor) const noexcept;
+  bool is_searching() const noexcept, is_expected(std::size_t s) const noexcept, is_heard(std::size_t s) const noexcept;
   int offset_in_dispute() noexcept;
   void start_search(const double* outputs) noexcept;
   void search_from(WalkingFilter& filter, HeadingSearch& search) noexcept;
   void think_again() noexcept;
-  Finding search_heading(const double* outputs) noexcept;
+  Finding search_heading(const double*outputs) noexcept, place_start(const double*outputs) noexcept;
   void start(Hypothesis& hypothesis) noexcept;
   void start_moved() noexcept;
   bool fits(WalkingFilter& filter, const double* outputs) noexcept;
@@ -168,8 +169,7 @@ class RHEC_EXPORT SensorWatch {
   bool is_place_lost() const noexcept, is_placed_otherwise() const noexcept;
   bool is_within_bounds(const Eigen::VectorXd&mean) const noexcept, is_probably_slip() const noexcept;
   void note_offsets() noexcept, note_corrected(bool has_jumped) noexcept, test_inputs(const double*outputs) noexcept;
-  void remember(double time, const double* outputs) noexcept;
-  void note_volume(const Estimate& estimate) noexcept;
+  void remember(double time, const double*outputs) noexcept, note_volume(const Estimate&estimate) noexcept;
   double limit(std::size_t sensor, Eigen::Index degrees) const noexcept;
 
   Setup setup_;

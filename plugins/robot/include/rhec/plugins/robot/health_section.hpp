@@ -10,7 +10,7 @@ namespace rhec {
 
 /// The keys of `estimator.health`: how stamps, inputs and measurements are judged.
 struct RHEC_EXPORT HealthOptions {
-  bool watch = true, offsets = SensorWatch::Setup{}.offsets;
+  bool watch = true, offsets = SensorWatch::Setup{}.offsets, whiteness = SensorWatch::Setup{}.whiteness;
   double gate = SensorWatch::Setup{}.gate;
   int proof = SensorWatch::Setup{}.proof;
   double lost_position = SensorWatch::Setup{}.lost_position, lost_heading = SensorWatch::Setup{}.lost_heading;

@@ -1,0 +1,98 @@
+// Vehicles that are not where they were said to begin.
+#include "rhec/core/estimation/sensor_watch.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <memory>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "support/sensor_faults.hpp"
+
+namespace rhec {
+namespace sensor_start_test {
+
+using namespace rhec::testing;
+
+/// Said to begin at the origin, known to half a metre, with a heading known to this [rad].
+Robot robot(const std::string& estimator, double heading) {
+  Settings settings = watched_settings(estimator, "");
+  apply_assignment(settings, "estimator.initial.sigma={x_pos: 0.5, y_pos: 0.5, beta: " + std::to_string(heading) +
+                                 ", delta: 0.02, kappa: 0.3, mu: 0.3}");
+  return {host(), RobotOptions::table().parse(settings, "robot")};
+}
+
+struct Seen {
+  double worst = 0.0;         ///< error of the position while health was ok [m]
+  double last = 0.0;          ///< at the end [m]
+  double worst_sigmas = 0.0;  ///< error by standard deviation, at the end
+  bool has_variances = true;  ///< all were positive
+  bool was_ok_at_the_end = false;
+};
+
+/// Ten seconds, with positions at 5 Hz between the nodes. `first_off`: error of the first one [m].
+Seen drive(const Robot& vehicle, double x, double y, double first_off) {
+  constexpr double speed = 3.0, wheelbase = 1.4, antenna = 0.4, tick = 0.01;
+  const auto estimator = vehicle.make_estimator();
+  std::mt19937_64 random(4);
+  std::normal_distribution<double> noise;
+  Eigen::Vector4d truth(x, y, 0.1, 0.0);
+  Seen seen;
+  for (int i = 0; i < 1000; ++i) {
+    const double time = tick * i, rate = 0.15 * std::cos(0.5 * time);
+    if (i % 20 == 0) estimator->push_input(time, std::vector<double>{speed, rate}.data());
+    if (i % 5 == 1)
+      estimator->push_measurement(time, std::vector<double>{nan, nan, truth[3] + 0.01 * noise(random)}.data());
+    if (i % 20 == 13) {
+      const double off = i < 20 ? first_off : 0.0;
+      estimator->push_measurement(
+          time, std::vector<double>{truth[0] - antenna * std::cos(truth[2]) + 0.03 * noise(random) + off,
+                                    truth[1] - antenna * std::sin(truth[2]) + 0.03 * noise(random), nan}
+                    .data());
+    }
+    if (i % 10 == 9) {
+      const Estimate& now = estimator->estimate(time);
+      const double error = (now.state.head<2>() - truth.head<2>()).norm();
+      seen.has_variances = seen.has_variances && now.covariance.diagonal().minCoeff() > 0.0;
+      if (now.health.level == HealthLevel::ok && i > 40) seen.worst = std::max(seen.worst, error);
+      seen.last = error;
+      seen.worst_sigmas = error / std::sqrt(now.covariance(0, 0) + now.covariance(1, 1));
+      seen.was_ok_at_the_end = now.health.level == HealthLevel::ok;
+    }
+    truth += tick * Eigen::Vector4d(0.9 * speed * std::cos(truth[2]), 0.9 * speed * std::sin(truth[2]),
+                                    0.9 * speed / wheelbase * std::tan(0.9 * truth[3]), rate);
+  }
+  return seen;
+}
+
+class Starts : public ::testing::TestWithParam<const char*> {};
+INSTANTIATE_TEST_SUITE_P(All, Starts, ::testing::Values("ekf", "bank", "rhe"), name_of_estimator);
+
+TEST_P(Starts, AreWhereTheFirstPositionSays) {
+  for (const double heading : {0.5, 3.0})
+    for (const double far : {0.0, 30.0, 3000.0, 5e6}) {
+      SCOPED_TRACE(std::to_string(heading) + " rad, " + std::to_string(far) + " m");
+      const Seen seen = drive(robot(GetParam(), heading), 0.1 * far, far, 0.0);
+      EXPECT_TRUE(seen.has_variances);
+      EXPECT_TRUE(seen.was_ok_at_the_end);
+      EXPECT_LT(seen.worst, 1.0);
+      EXPECT_LT(seen.last, 0.3);
+      EXPECT_LT(seen.worst_sigmas, 4.0);
+    }
+}
+
+TEST_P(Starts, AreNotWhereAWrongFirstPositionSays) {
+  for (const double off : {100.0, 1000.0, 1e6}) {
+    SCOPED_TRACE(off);
+    const Seen seen = drive(robot(GetParam(), 0.5), 0.0, 0.0, off);
+    EXPECT_TRUE(seen.has_variances);
+    EXPECT_TRUE(seen.was_ok_at_the_end);
+    EXPECT_LT(seen.worst, 1.0);
+    EXPECT_LT(seen.last, 0.3);
+  }
+}
+
+}  // namespace sensor_start_test
+}  // namespace rhec
