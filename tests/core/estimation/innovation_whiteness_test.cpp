@@ -7,6 +7,8 @@
 #include <random>
 #include <vector>
 
+#include <Eigen/Cholesky>
+
 namespace rhec::innovation_whiteness_test {
 namespace {
 
