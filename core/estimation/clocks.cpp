@@ -117,10 +117,15 @@ bool Clocks::follows_step(Source& source, double time, double others) noexcept {
   const bool is_far =
       source.leads >= least_leads && std::abs(step) > std::max(least_step, unusual_lead * source.lead_deviation);
   const auto is_alike = [&](double other) { return std::abs(other - step) < same_step * std::abs(step); };
+  // Where the others are as slow, a message of all that was lost looks the same.
+  double quickest = std::numeric_limits<double>::infinity();
+  for (const Source& other : sources_)
+    if (&other != &source && !std::isnan(other.rhythm.last())) quickest = std::min(quickest, usual_interval(other));
+  const bool may_be_lost = source.steps == 0 && quickest > 0.8 * usual && std::abs(step - usual) < same_step * usual;
   const double elapsed = others - source.last_others;
   const bool is_next = elapsed > 0.5 * usual && elapsed < 1.5 * usual;
-  const bool follows =
-      is_far && is_next && is_alike(source.steps > 0 ? source.step : time - source.rhythm.last() - usual);
+  const bool follows = is_far && is_next && !may_be_lost &&
+                       is_alike(source.steps > 0 ? source.step : time - source.rhythm.last() - usual);
   if (!follows) {
     source.steps = 0;
     return false;

@@ -101,7 +101,7 @@ terrain: {name: constant, values: {kappa: 0.87, mu: 1}}
   EXPECT_THAT(log.ended, testing::HasSubstr("takes itself to be at the end of the path, and is "));
   // Nor if the path ends in a stop.
   const std::string file = testing::TempDir() + "/ends_in_a_stop.csv";
-  std::ofstream(file) << "x,y,speed\n0,0,4\n60,0,4\n80,0,0\n";
+  std::ofstream(file) << "x,y,speed\n0,0,4\n150,0,4\n300,0,0\n";
   apply_assignment(settings, "path={name: file, file: " + file + "}");
   const RunLog stopped = run_closed_loop({Host(), settings});
   EXPECT_FALSE(stopped.completed);
