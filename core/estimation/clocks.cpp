@@ -93,12 +93,15 @@ void Clocks::suspect(Source& source, double stamp) noexcept {
 
 /// The first stamp by the new clock is an interval after the newest by the old one. Of a source that has always gone by
 /// another clock, what it says is as new as what the others say.
-double Clocks::set_clock(Source& source, double stamp) noexcept {
+double Clocks::new_offset(const Source& source, double stamp) const noexcept {
   const double last = source.rhythm.last();
-  source.offset = std::isnan(last) ? stamp - now_ : source.first_suspect - (last + usual_interval(source));
+  return std::isnan(last) ? stamp - now_ : source.first_suspect - (last + usual_interval(source));
+}
+
+void Clocks::set_clock(Source& source, double offset) noexcept {
+  source.offset = offset;
   source.suspects = source.steps = 0;
   ++settings_;
-  return use(source, stamp - source.offset);
 }
 
 /// The newest time of all others; NaN without any.
@@ -114,18 +117,21 @@ double Clocks::newest_of_others(const Source& source) const noexcept {
 /// by more or less, and later ones stay there.
 bool Clocks::follows_step(Source& source, double time, double others) noexcept {
   const double usual = usual_interval(source), step = time - others - source.usual_lead;
+  const double elapsed = others - source.last_others;
+  const bool is_next = elapsed > 0.5 * usual && elapsed < 1.5 * usual;
   const bool is_far =
       source.leads >= least_leads && std::abs(step) > std::max(least_step, unusual_lead * source.lead_deviation);
   const auto is_alike = [&](double other) { return std::abs(other - step) < same_step * std::abs(step); };
   // Where the others are as slow, a message of all that was lost looks the same.
-  double quickest = std::numeric_limits<double>::infinity();
-  for (const Source& other : sources_)
-    if (&other != &source && !std::isnan(other.rhythm.last())) quickest = std::min(quickest, usual_interval(other));
-  const bool may_be_lost = source.steps == 0 && quickest > 0.8 * usual && std::abs(step - usual) < same_step * usual;
-  const double elapsed = others - source.last_others;
-  const bool is_next = elapsed > 0.5 * usual && elapsed < 1.5 * usual;
-  const bool follows = is_far && is_next && !may_be_lost &&
-                       is_alike(source.steps > 0 ? source.step : time - source.rhythm.last() - usual);
+  const auto may_be_lost = [&] {
+    double quickest = std::numeric_limits<double>::infinity();
+    for (const Source& other : sources_)
+      if (&other != &source && !std::isnan(other.rhythm.last())) quickest = std::min(quickest, usual_interval(other));
+    return quickest > 0.8 * usual && std::abs(step - usual) < same_step * usual;
+  };
+  const bool follows =
+      is_far && is_next &&
+      (source.steps > 0 ? is_alike(source.step) : is_alike(time - source.rhythm.last() - usual) && !may_be_lost());
   if (!follows) {
     source.steps = 0;
     return false;
@@ -149,9 +155,7 @@ bool Clocks::take_over_offset(Source& source, double stamp) noexcept {
     if (other.offset == source.offset) continue;
     const Place there = place(source, stamp - other.offset);
     if (there != Place::in_order) continue;
-    source.offset = other.offset;
-    source.suspects = source.steps = 0;
-    ++settings_;
+    set_clock(source, other.offset);
     return true;
   }
   return false;
@@ -169,12 +173,11 @@ double Clocks::take(int index, double stamp) noexcept {
   const bool is_near = there == Place::in_order || there == Place::late || there == Place::repeated;
   const bool follows = is_near && follows_step(source, time, others);
   source.last_others = others;
-  if (follows && source.steps >= confirm_step) {
-    source.offset += source.step;
-    source.steps = source.suspects = 0;
-    ++settings_;
-    return use(source, stamp - source.offset);
-  }
+  const auto use_by = [&](double offset) {
+    set_clock(source, offset);
+    return use(source, stamp - offset);
+  };
+  if (follows && source.steps >= confirm_step) return use_by(source.offset + source.step);
   // Behind the others there is room for what is just late.
   if (follows && source.step > 0.0) {
     ++refused_;
@@ -188,7 +191,7 @@ double Clocks::take(int index, double stamp) noexcept {
   if (take_over_offset(source, stamp)) return use(source, stamp - source.offset);
   suspect(source, stamp);
   if (there == Place::repeated) {
-    if (source.suspects >= confirm_repetition) return set_clock(source, stamp);
+    if (source.suspects >= confirm_repetition) return use_by(new_offset(source, stamp));
     return use(source, time);
   }
   const bool is_gap = there == Place::far_ahead && time <= now_ + setup_.longest_gap;
@@ -196,7 +199,7 @@ double Clocks::take(int index, double stamp) noexcept {
     source.suspects = 0;
     return use(source, time);
   }
-  if (source.suspects >= confirm_clock) return set_clock(source, stamp);
+  if (source.suspects >= confirm_clock) return use_by(new_offset(source, stamp));
   ++refused_;
   return unknown;
 }

@@ -77,17 +77,10 @@ void SensorWatch::follow(const Estimate& estimate) noexcept {
   const int heading = model.description().roles.heading;
   if (!is_active_) {
     if (!(estimate.covariance.diagonal().maxCoeff() > 0.0)) return;  // of one that is not estimated
-    const bool is_known =
+    is_active_ =
         heading < 0 || !(estimate.covariance(heading, heading) > Memory::known_heading * Memory::known_heading);
-    if (!is_known) {
-      own_->filter.mean().head(nx) = estimate.state;
-      own_->filter.mean().tail(np) = estimate.parameters;
-      copy_numbers(estimate.covariance, own_->filter.covariance());
-      return;
-    }
-    is_active_ = true;
   }
-  note_volume(estimate);
+  if (is_active_) note_volume(estimate);
   if (is_blind_ || is_searching()) return;
   own_->filter.mean().head(nx) = estimate.state;
   own_->filter.mean().tail(np) = estimate.parameters;

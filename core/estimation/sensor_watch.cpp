@@ -183,7 +183,6 @@ void SensorWatch::reset() noexcept {
     own_->filter.mean() = setup_.initial_mean;
     own_->filter.covariance() = setup_.initial_covariance;
   }
-  memory_->has_begun = false;
   memory_->covariance_factor = 1.0;
   memory_->typical_volume = memory_->volumes = 0.0;
   memory_->stuck.reset();
@@ -318,10 +317,6 @@ void SensorWatch::note_sample(double time, const double* outputs) noexcept {
 
 SensorWatch::Finding SensorWatch::judge(double time, double* outputs, const double* weights) noexcept {
   memory_->has_advanced = false;
-  if (!is_active_ && !std::exchange(memory_->has_begun, true)) {
-    raw_weights_.assign(weights, weights ? weights + raw_.size() : nullptr);
-    return place_start(outputs);
-  }
   note_sample(time, outputs);
   const int counted = memory_->is_counted;
   if (memory_->since_release < std::numeric_limits<int>::max()) memory_->since_release += counted;

@@ -121,8 +121,7 @@ struct SensorWatch::Memory {
       if (is_gap(entry(ago - 1).time - entry(ago).time, loss->usual_interval())) return true;
     return false;
   }
-  bool has_begun = false;  ///< there was a sample, of which only is asked where the vehicle is
-  double now = unknown;    ///< of the last sample [s]
+  double now = unknown;  ///< of the last sample [s]
   std::int64_t count = 0;
   std::int64_t connected = 0;  ///< of the newest, by what moves and by what is measured
   // Before the last advance, and that.

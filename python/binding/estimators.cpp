@@ -265,6 +265,9 @@ void bind_estimates(py::module_& module) {
           },
           "why the health is not ok, in words")
       .def_property_readonly(
+          "covariance_factor", [](const EstimateObject& self) { return self.value.health.covariance_factor; },
+          "by how much larger the covariance is than the estimator's own, since innovations are correlated")
+      .def_property_readonly(
           "innovations", &innovations_of,
           "of the measurements since the last estimate: dicts of time [s], sensor, accepted, nis, value, "
           "covariance")

@@ -85,6 +85,7 @@ def test_estimates_stay_as_they_are():
     numpy.testing.assert_array_equal(last.covariance, last.covariance.T)
     numpy.testing.assert_allclose(last.sigmas, numpy.sqrt(numpy.diag(last.covariance)))
     assert last.health == "ok" and last.findings == ""
+    assert 1.0 <= last.covariance_factor < 2.0
     assert [each["sensor"] for each in last.innovations] == ["x_gps and y_gps", "delta"]
     assert last.report.usable and not last.fallback
     assert [*last] == last.keys() == ["x_pos", "y_pos", "beta", "delta", "kappa", "mu"] and dict(last)["kappa"] == last["kappa"]

@@ -77,7 +77,8 @@ class RHEC_EXPORT Clocks {
   double room_ahead(const Source& source) const noexcept;
   double use(Source& source, double time) noexcept;
   void suspect(Source& source, double stamp) noexcept;
-  double set_clock(Source& source, double stamp) noexcept;
+  double new_offset(const Source& source, double stamp) const noexcept;
+  void set_clock(Source& source, double offset) noexcept;
   double newest_of_others(const Source& source) const noexcept;
   bool follows_step(Source& source, double time, double others) noexcept;
   void note_lead(Source& source, double lead) noexcept;
