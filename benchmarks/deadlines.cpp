@@ -134,6 +134,7 @@ Longest drive(const sim::Scenario& scenario, Trouble trouble, std::chrono::micro
   const bool is_cold = trouble == Trouble::cold_start;
   const auto estimator = is_cold ? robot.make_estimator() : robot.make_estimator(scenario.initial_state());
   const auto controller = robot.make_controller(scenario.path(), estimator->slip_ahead());
+  controller->locate(scenario.start());
   Drive vehicle(robot, scenario.initial_state());
   Longest longest;
   std::deque<Row> waiting;

@@ -22,6 +22,12 @@ namespace {
 // A heading whose standard deviation is larger does not count in the search for the vehicle's place [rad].
 constexpr double known_heading = 0.5;
 
+bool is_finite(const Obstacle& it) noexcept {
+  const double numbers[] = {it.x,       it.y,          it.semi_axis_along, it.semi_axis_across,
+                            it.heading, it.velocity_x, it.velocity_y};
+  return std::ranges::all_of(numbers, [](double number) { return std::isfinite(number); });
+}
+
 // A plan that covers less than this share of the path's way, and turns by less than this, is one to stand.
 constexpr double standing_share = 0.1, standing_turn = 0.1;  // [1], [rad]
 
@@ -177,15 +183,25 @@ void Controller::reset() noexcept {
   std::fill(last_inputs_.begin(), last_inputs_.end(), std::numeric_limits<double>::quiet_NaN());
 }
 
+void Controller::locate(double arc_length) noexcept {
+  is_located_ = std::isfinite(arc_length);
+  if (is_located_) follower_.reset(arc_length);
+}
+
 void Controller::applied(const double* inputs) noexcept {
   for (std::size_t j = 0; j < last_inputs_.size(); ++j)
     if (!std::isnan(inputs[j])) last_inputs_[j] = inputs[j];
 }
 
 int Controller::set_obstacles(std::span<const Obstacle> obstacles, double time) noexcept {
-  obstacle_count_ = std::min(obstacles.size(), obstacles_.size());
-  std::copy_n(obstacles.begin(), obstacle_count_, obstacles_.begin());
-  seen_ = time;
+  obstacle_count_ = 0;
+  seen_ = std::isfinite(time) ? time : 0.0;
+  for (Obstacle obstacle : obstacles) {
+    if (obstacle_count_ == obstacles_.size()) break;
+    // One of which nobody knows when it was there is taken to stay there.
+    if (!std::isfinite(time)) obstacle.velocity_x = obstacle.velocity_y = 0.0;
+    if (is_finite(obstacle)) obstacles_[obstacle_count_++] = obstacle;
+  }
   return static_cast<int>(obstacle_count_);
 }
 

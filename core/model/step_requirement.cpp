@@ -205,7 +205,7 @@ std::vector<OperatingPoint> operating_points(const Model& model, const ModelDesc
   }
   const std::vector<double> without_slip = nominal_values(about.parameters);
   std::vector<OperatingPoint> points;
-  for (const double share : {1.0, 0.2, 2.0}) {
+  for (const double share : {1.0, 0.2, 2.0, 0.0}) {
     for (const std::span<const double> slip : {std::span<const double>(without_slip), parameters}) {
       OperatingPoint straight;
       straight.parameters.assign(slip.begin(), slip.end());

@@ -103,6 +103,12 @@ void applied(ControllerObject& self, const Numbers& inputs) {
   locked(self, [&](Controller& controller) { controller.applied(values); });
 }
 
+void locate(ControllerObject& self, std::optional<double> arc_length) {
+  if (arc_length && !std::isfinite(*arc_length))
+    throw Error("arc_length: found a number that is not finite; expected metres along the path, or None");
+  locked(self, [&](Controller& controller) { arc_length ? controller.locate(*arc_length) : controller.locate(); });
+}
+
 int set_obstacles(ControllerObject& self, const Numbers& obstacles, double time) {
   constexpr py::ssize_t width = 7;
   const bool is_none = obstacles.ndim() == 1 && obstacles.size() == 0;
@@ -235,9 +241,10 @@ void bind_controllers(py::module_& module) {
            "Looks at the next sampling interval alone. Does what `finish` does, which takes a moment.")
       .def("applied", &applied, py::arg("inputs"),
            "Says which inputs, (n_u), the vehicle has had, where they were not the command.")
-      .def(
-          "locate", [](ControllerObject& self) { locked(self, [](Controller& c) { c.locate(); }); },
-          "Searches the whole path for the vehicle at the next call.")
+      .def("locate", &locate, py::arg("arc_length") = py::none(),
+           "Searches the whole path for the vehicle at the next call; or says how far along it the vehicle is [m], "
+           "where\n"
+           "that is known.")
       .def("set_obstacles", &set_obstacles, py::arg("obstacles"), py::arg("time"),
            "The obstacles from now on, as they were at a time [s]: rows of x [m], y [m], semi-axes along and across "
            "[m],\n"

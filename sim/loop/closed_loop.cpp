@@ -118,8 +118,9 @@ RunLog run_closed_loop(const Scenario& scenario, const LoopHooks& hooks) {
   const auto limit = static_cast<std::int64_t>(3.0 * scenario.path().duration() / step) + 100;
   Consistency consistency(robot.estimated_description());
   int path_segment = 0;
-  true_follower.locate(truth.state()[roles.position_x], truth.state()[roles.position_y],
-                       roles.heading >= 0 ? truth.state()[roles.heading] : std::numeric_limits<double>::quiet_NaN());
+  // By its place alone a start on a later lap, or on the other branch of a crossing, is not to be known.
+  true_follower.reset(scenario.start());
+  controller->locate(scenario.start());
   RunLog log;
   log.samples.reserve(static_cast<std::size_t>(limit));
   const auto begin = [&hooks](LoopPart part) {

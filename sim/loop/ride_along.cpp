@@ -163,6 +163,7 @@ std::vector<Ride> ride_along(const Scenario& scenario, std::span<const Scenario>
   const Roles& roles = robot.model()->description().roles;
   LoopWorld world(scenario, {.outputs = robot.output_sigmas(), .inputs = robot.input_sigmas()});
   const auto controller = robot.make_controller(scenario.path());
+  controller->locate(scenario.start());
   std::vector<Rider> all;
   all.reserve(riders.size());
   for (const Scenario& rider : riders) all.emplace_back(rider, scenario.initial_state());

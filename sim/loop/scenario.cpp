@@ -478,11 +478,11 @@ Scenario::Scenario(const Host& host, const Settings& settings)
                         "how long it takes is up to speed, to path.spacing of its waypoints, and to "
                         "path.acceleration and path.lateral_acceleration",
                         path_.length(), path_.duration(), samples, options_.step, most_samples));
-  const double along = path_table().parse(options_.path, "path").start;
-  if (!(along < path_.length()))
+  start_ = path_table().parse(options_.path, "path").start;
+  if (!(start_ < path_.length()))
     throw key_or_section(options_.path, "start")
-        .error(fmt::format("found {}, expected less than the path's length of {:.4g} m", along, path_.length()));
-  const PathPoint start = path_.point_at(along);
+        .error(fmt::format("found {}, expected less than the path's length of {:.4g} m", start_, path_.length()));
+  const PathPoint start = path_.point_at(start_);
   initial_state_ = Eigen::VectorXd::Zero(robot_.model()->state_count());
   robot_.model()->description().roles.place(start.x, start.y, start.heading, initial_state_.data());
 }

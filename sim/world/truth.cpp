@@ -96,7 +96,7 @@ void TruthVehicle::shorten_steps() {
   if (needed.mode_substeps == 0)
     throw Error(
         fmt::format("truth vehicle: model '{}' has a time constant of {:.3g} s, in the state '{}', which {} steps in "
-                    "{:g} s do not follow; leave out of the model what settles so fast",
+                    "{:g} s do not follow; shorten `vehicle.step`, or leave out of the model what settles so fast",
                     about.name, needed.time_constant, about.states[needed.state].name, StepRequirement::most_substeps,
                     options_.step));
   options_.step /= needed.mode_substeps;

@@ -8,9 +8,17 @@
 #include "rhec/core/ocp/iterate_checks.hpp"
 #include "rhec/core/qp/stage_checks.hpp"
 #include "rhec/plugins/kit/sdk.hpp"
+#include "step_costs.hpp"
 
 namespace rhec::gn_rti {
 namespace {
+
+// Limits surprise where what they cost has risen by more than this share of the last objective, and by more than a step
+// of this length along the gradient would gain: more than one that comes in sight at the horizon's end. Hard ones cost,
+// by the unit, so many times such a step.
+constexpr double large_share = 2.0, large_push = 30.0, hard_price = 100.0;
+// So many Gauss-Newton steps lead around what has appeared.
+constexpr int evading_steps = 4;
 
 /// Visits corresponding rows of two iterates, of states and controls alike: function(destination, source, length).
 template <class Function>
@@ -105,6 +113,7 @@ void GnRti::reset() noexcept {
 }
 
 Hessian GnRti::hessian() const noexcept {
+  if (evades_) return Hessian::gauss_newton;
   if (use_exact_ && ocp_->has_second_derivatives()) return Hessian::exact;
   if (options_.hessian == Curvature::automatic)
     return options_.mode == Mode::rti ? choice_.now() : ocp_->preferred_hessian();
@@ -165,6 +174,8 @@ Report GnRti::feedback(Iterate& iterate, Clock::time_point deadline) noexcept {
       report = real_time(iterate, deadline);
     } else if (is_sound_start(*ocp_, iterate, scratch_)) {
       report = converge(iterate, deadline);
+      if (!limits_.empty()) expected_limits_ = costs_now(linearisation_->qp());
+      expected_objective_ = report.objective;
     }
   }
   is_prepared_ = false;
@@ -176,7 +187,9 @@ Report GnRti::real_time(Iterate& iterate, Clock::time_point deadline) noexcept {
   report.status = Status::step_taken;
   qp_solver_.set_cheap(true);
   bool is_ready = is_prepared_ && linearisation_->is_at(iterate);
-  for (int iteration = 0; iteration < options_.iterations; ++iteration) {
+  int steps = options_.iterations;
+  evades_ = false;
+  for (int iteration = 0; iteration < steps; ++iteration) {
     if (iteration > 0 && is_past(deadline)) {
       report.status = Status::deadline;
       break;
@@ -184,6 +197,14 @@ Report GnRti::real_time(Iterate& iterate, Clock::time_point deadline) noexcept {
     if (!is_ready) linearisation_->prepare(iterate, hessian());
     linearisation_->refresh(iterate);
     qp_ = &linearisation_->qp();
+    if (iteration == 0 && is_surprised()) {
+      evades_ = true;
+      steps = std::max(steps, evading_steps);
+      linearisation_->prepare(iterate, hessian());
+      linearisation_->refresh(iterate);
+      qp_ = &linearisation_->qp();
+      is_ready = false;
+    }
     if (!is_ready) qp_solver_.guess_from(*qp_, iterate);
     is_ready = false;
     auto outcome = solve_qp(report, deadline);
@@ -207,7 +228,7 @@ Report GnRti::real_time(Iterate& iterate, Clock::time_point deadline) noexcept {
     // processor's cache has room for only a few horizons.
     add_to_step(ocp_->intervals(), iterate, step_);
     if (!limits_.empty()) clip_active_controls(step_);
-    const bool is_last = iteration + 1 == options_.iterations;
+    const bool is_last = iteration + 1 == steps;
     if (!is_last && !assess_step(step_, report)) {
       report.status = Status::stalled;
       break;
@@ -217,12 +238,25 @@ Report GnRti::real_time(Iterate& iterate, Clock::time_point deadline) noexcept {
     ++report.iterations;
     if (!is_last && report.kkt.largest() <= options_.residual) break;
   }
+  evades_ = false;
   if (report.iterations == 0) {
     give_up(iterate, report);
     return report;
   }
   if (report.status == Status::infeasible || report.status == Status::stalled) report.status = Status::iteration_limit;
   return report;
+}
+
+/// Whether limits are violated by the guess much more than they were at the end of the last sample: something has
+/// appeared in its way.
+bool GnRti::is_surprised() const noexcept {
+  if (limits_.empty() || options_.hessian == Curvature::exact) return false;
+  const StageQp& qp = linearisation_->qp();
+  const LimitCosts now = costs_now(qp);
+  const double slack = now.slack - expected_limits_.slack, violation = now.violation - expected_limits_.violation;
+  if (!(slack > 0.0) && !(violation > 0.0)) return false;
+  const double unit = 1.0 + largest_gradient(qp), more = slack + hard_price * unit * violation;
+  return more > large_share * std::abs(expected_objective_) && more > large_push * unit;
 }
 
 /// Puts controls back that rounding has left beyond their active bounds. The guess of the next sample has them inside:
@@ -242,11 +276,13 @@ void GnRti::clip_active_controls(Iterate& iterate) const noexcept {
 /// Linearises at a new iterate, as the next sample will need it; false if the result is not finite.
 bool GnRti::assess_step(const Iterate& iterate, Report& report) noexcept {
   double objective = linearisation_->linearise_for_residual(iterate, hessian());
-  objective += slack_costs(linearisation_->qp(), all_stages(*ocp_));
+  const LimitCosts limits = limits_.empty() ? LimitCosts{} : costs_now(linearisation_->qp());
+  objective += limits.slack;
   const KktResidual kkt = kkt_residual(linearisation_->qp(), iterate);
   if (!std::isfinite(objective) || !std::isfinite(kkt.stationarity)) return false;
-  report.objective = objective;
+  report.objective = expected_objective_ = objective;
   report.kkt = kkt;
+  expected_limits_ = limits;
   return true;
 }
 

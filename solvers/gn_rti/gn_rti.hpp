@@ -41,9 +41,10 @@ struct GnRtiOptions {
 /// `prepare` linearises at the guess and factorises with the active set that the guess' multipliers imply; `feedback`
 /// then needs vector operations only, unless the newest data change the active set. `finish` linearises at the new
 /// iterate. The next guess is that iterate shifted by one stage, so `prepare` has at most one interval left to
-/// evaluate. Estimation problems have small residuals and use the Gauss-Newton Hessian. Control problems under slip
-/// have large residuals, on which Gauss-Newton does not even converge locally; they use the exact Hessian with the
-/// guess' costates, convexified inside the recursion.
+/// evaluate. Where limits have appeared in the way of the guess, that sample is solved as in mode `converge`: full
+/// steps from a plan through an obstacle may end, and stay, at a saddle point. Estimation problems have small residuals
+/// and use the Gauss-Newton Hessian. Control problems under slip have large residuals, on which Gauss-Newton does not
+/// even converge locally; they use the exact Hessian with the guess' costates, convexified inside the recursion.
 class GnRti final : public Solver {
  public:
   using Options = GnRtiOptions;
@@ -65,6 +66,7 @@ class GnRti final : public Solver {
   void linearise(Iterate& iterate) noexcept;
   void settle(Iterate& iterate, Report& report) noexcept;
   Report real_time(Iterate& iterate, Clock::time_point deadline) noexcept;
+  bool is_surprised() const noexcept;
   void clip_active_controls(Iterate& iterate) const noexcept;
   bool assess_step(const Iterate& iterate, Report& report) noexcept;
   void give_up(const Iterate& iterate, Report& report) noexcept;
@@ -110,6 +112,9 @@ class GnRti final : public Solver {
   bool is_pending_ = false;  ///< the last step is not assessed yet; `step_` holds the iterate before it
   bool use_exact_ = false;
   HessianChoice choice_;  ///< of mode rti
+  LimitCosts expected_limits_;
+  double expected_objective_ = 0.0;  ///< of mode rti: at the end of the last sample
+  bool evades_ = false;              ///< what has appeared in the way of the guess: with Gauss-Newton steps
   double defect_penalty_ = 0.0, bound_penalty_ = 0.0;
   bool is_elastic_ = false, was_elastic_ = false;  ///< hard limits have a price in the QP, and had in the last step's
   int penalty_cuts_left_ = 0, futile_ = 0;

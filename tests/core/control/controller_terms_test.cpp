@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include <fmt/format.h>
+
 #include "rhec/core/control/controller.hpp"
 #include "rhec/plugins/robot/robot.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
@@ -26,12 +28,12 @@ const Host& host() {
 
 /// A bicycle on a straight path that knows where it is and how much it slips.
 struct Drive {
-  explicit Drive(const std::string& controller_section)
+  explicit Drive(const std::string& controller_section, double speed = 2.0)
       : robot(host(),
               RobotOptions::table().parse(
                   parse_yaml("{model: bicycle_slip, step: 0.2, controller: {" + controller_section + "}}", "test"),
                   "robot")),
-        controller(robot.make_controller(Path({{0.0, 0.0, 2.0}, {60.0, 0.0, 2.0}}))) {
+        controller(robot.make_controller(Path({{0.0, 0.0, speed}, {60.0, 0.0, speed}}))) {
     now.state = Eigen::Vector4d(0.0, 0.0, 0.0, 0.0);
     now.parameters = Eigen::Vector2d(0.9, 0.9);
   }
@@ -92,6 +94,45 @@ TEST(ControllerTerms, KnowObstaclesThatAreSeenAtRunTime) {
   EXPECT_EQ(allocation_count(), before);
   EXPECT_GT(least_distance(drive, -0.3), 1.5 - 0.02);
   EXPECT_EQ(drive.controller->set_obstacles({}, 0.0), 0);
+}
+
+/// Exact steps from a plan that leads through its middle stay there, at a saddle point.
+TEST(ControllerTerms, GoAroundAnObstacleThatAppearsHeadOn) {
+  for (const char* solver : {"gn_rti", "gn_rti, iterations: 5, residual: 0.01"}) {
+    for (const char* hard : {"false", "true"}) {
+      for (const double distance : {5.0, 6.0, 7.0, 8.0}) {
+        for (const double aside : {-0.05, 0.01, 0.05}) {
+          Drive drive(fmt::format("horizon: 15, terms: [{{name: obstacles, vehicle_radius: 0.5, most: 1, hard: {}}}], "
+                                  "solver: {{name: {}}}",
+                                  hard, solver),
+                      3.0);
+          for (int k = 0; k < 10; ++k) drive.advance();
+          const Obstacle seen{
+              .x = drive.now.state[0] + distance, .y = aside, .semi_axis_along = 1.0, .semi_axis_across = 1.0};
+          drive.controller->set_obstacles({&seen, 1}, drive.now.time);
+          double least = HUGE_VAL;
+          for (int k = 0; k < 30; ++k) {
+            drive.advance();
+            least = std::min(least, drive.distance(seen.x, seen.y));
+          }
+          EXPECT_GT(least, 1.5 - 0.15) << solver << ", hard: " << hard << ", " << distance << " m ahead, " << aside;
+          EXPECT_GT(drive.now.state[0], seen.x) << "it goes on";
+        }
+      }
+    }
+  }
+}
+
+TEST(ControllerTerms, LeaveOutObstaclesWithNumbersThatAreNotFinite) {
+  Drive drive("terms: [{name: obstacles, vehicle_radius: 0.5, most: 2}]");
+  drive.advance();
+  const Obstacle broken{.x = NAN, .semi_axis_along = 1.0, .semi_axis_across = 1.0},
+      seen{.x = 15.0, .y = 0.2, .semi_axis_along = 1.0, .semi_axis_across = 1.0, .velocity_x = -0.3};
+  const std::vector<Obstacle> both{broken, seen};
+  EXPECT_EQ(drive.controller->set_obstacles(both, 0.0), 1);
+  EXPECT_GT(least_distance(drive, -0.3), 1.5 - 0.05);
+  EXPECT_EQ(drive.controller->set_obstacles(both, NAN), 1) << "at an unknown time it is at rest";
+  EXPECT_FALSE(drive.advance().fallback);
 }
 
 TEST(ControllerTerms, DataThatAreNewSinceThePreparationCount) {

@@ -224,6 +224,24 @@ TEST(ControllerReference, StartsWhereTheVehicleIs) {
   EXPECT_NEAR(controller->control(estimate_at(*controller, 80.0, 0.0, 0.0)).reference.x, 80.0, 1e-9);
 }
 
+TEST(ControllerReference, StartsOnTheLapThatItIsTold) {
+  std::vector<Waypoint> laps;
+  for (int i = 0; i <= 240; ++i) {
+    const double turn = 2.0 * std::numbers::pi * i / 60.0;
+    laps.push_back({8.0 * std::sin(turn), 8.0 - 8.0 * std::cos(turn), 2.0});
+  }
+  const Path path(laps);
+  const double lap = 0.25 * path.length(), third = 2.0 * lap + 10.0;
+  const PathPoint place = path.point_at(third);
+  const auto controller = controller_on(path);
+  const Estimate there = estimate_at(*controller, place.x, place.y, place.heading);
+  controller->control(there);
+  EXPECT_NEAR(controller->follower().arc_length(), third - 2.0 * lap, 1e-6) << "the first of places that are the same";
+  controller->locate(third);
+  controller->control(there);
+  EXPECT_NEAR(controller->follower().arc_length(), third, 1e-6);
+}
+
 /// Follows the diagonal for so many samples from its tenth metre, looking off the path by an angle, without slip.
 struct Turned {
   bool ever = false, now = false;  ///< facing away, by what the commands say

@@ -130,6 +130,19 @@ TEST(Headlands, AreDrivenInReverse) {
   }
 }
 
+TEST(Headlands, StartsAreOnTheLapAndTheBranchThatTheArcLengthSays) {
+  // On the second lap, and where both circles touch, on the way into the second one.
+  for (const char* start : {"path.start=200", "path.start=62.84"}) {
+    const Scenario scenario =
+        scenario_with({"path.laps=2", "path.radius=10", "path.acceleration=10", "speed=4", start});
+    const RunLog log = run_closed_loop(scenario);
+    ASSERT_TRUE(log.completed) << log.ended;
+    const double rest = scenario.path().length() - scenario.start();
+    EXPECT_NEAR(static_cast<double>(log.samples.size()) * scenario.robot().step(), rest / 4.0, 5.0) << start;
+    for (const Sample& sample : log.samples) ASSERT_LT(std::abs(sample.tracking), 2.0) << start << ", " << sample.time;
+  }
+}
+
 TEST(Headlands, StartsMayBeAnywhereOnThePath) {
   const Scenario scenario = scenario_with({"path.laps=1", "speed=4", "path.start=60"});
   const RunLog log = run_closed_loop(scenario);

@@ -93,8 +93,12 @@ class RHEC_EXPORT Controller {
   void applied(const double* inputs) noexcept;
   /// Searches the whole path for the vehicle at the next call, as at the first one.
   void locate() noexcept { is_located_ = false; }
+  /// Says where on the path the vehicle is [m], where that is known: a path may pass the same place more than once, as
+  /// laps do. The next call searches near it. A number that is not finite asks for the search of the whole path.
+  void locate(double arc_length) noexcept;
   /// Says which obstacles there are from now on, as they were at a time on the clock of the estimates [s]: those that
-  /// the terms have room for, the first ones. Returns how many that are. They move on with their velocities.
+  /// the terms have room for, the first ones. Returns how many that are. They move on with their velocities. One that
+  /// has a number that is not finite is left out; at a time that is not, all are at rest.
   int set_obstacles(std::span<const Obstacle> obstacles, double time) noexcept;
   /// Does work for the next sample in advance; calling it is optional.
   void prepare() noexcept;

@@ -45,9 +45,9 @@ RHEC_EXPORT StepRequirement step_requirement(const Model& model, std::span<const
                                              double duration);
 
 /// Points that a vehicle is likely to pass: straight ahead at a ground speed [m/s] (none: at which the speed input has
-/// its typical magnitude) and at a fifth and twice of it, without slip and with `parameters`; then with each other
-/// input, and each state that has bounds, moved both ways by a typical magnitude within its bounds. `about` is the
-/// model's description with the bounds that hold.
+/// its typical magnitude), at a fifth and twice of it, and standing, without slip and with `parameters`; then with each
+/// other input, and each state that has bounds, moved both ways by a typical magnitude within its bounds. `about` is
+/// the model's description with the bounds that hold.
 RHEC_EXPORT std::vector<OperatingPoint> operating_points(const Model& model, const ModelDescription& about,
                                                          std::span<const double> parameters,
                                                          std::optional<double> ground_speed = {});

@@ -36,6 +36,8 @@ class RHEC_EXPORT Scenario {
   const ScenarioOptions& options() const noexcept { return options_; }
   const Robot& robot() const noexcept { return robot_; }
   const Path& path() const noexcept { return path_; }
+  /// How far along the path the vehicle begins [m].
+  double start() const noexcept { return start_; }
   const SlipField& terrain() const noexcept { return *terrain_; }
   const TruthOptions& vehicle() const noexcept { return vehicle_; }
   /// By input of the model.
@@ -43,7 +45,7 @@ class RHEC_EXPORT Scenario {
   /// By output of the model.
   const std::vector<SensorTiming>& sensor_timings() const noexcept { return sensor_timings_; }
   const std::vector<FaultOptions>& faults() const noexcept { return faults_; }
-  /// Initial state: at the path's first point, heading along the path, all else zero.
+  /// Initial state: on the path at `start`, heading along it, all else zero.
   const Eigen::VectorXd& initial_state() const noexcept { return initial_state_; }
   /// Those of the robot, and of a drive that no vehicle could follow: a sentence each.
   std::vector<std::string> notes() const;
@@ -52,6 +54,7 @@ class RHEC_EXPORT Scenario {
   ScenarioOptions options_;
   Robot robot_;
   Path path_;
+  double start_ = 0.0;
   std::unique_ptr<const SlipField> terrain_;
   TruthOptions vehicle_;
   std::vector<ActuatorOptions> actuators_;
