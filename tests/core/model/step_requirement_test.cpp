@@ -49,6 +49,30 @@ std::shared_ptr<const Model> lagging(double tau) {
   return std::make_shared<FormulaModel<Lagging>>(formula, about);
 }
 
+/// A lateral speed that a tyre takes away with a force over the speed: at rest a hundred times as fast as at 1 m/s.
+template <class Scalar>
+struct Sideways {
+  static constexpr int state_count = 2, input_count = 1, parameter_count = 1, output_count = 1;
+  void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
+    using std::sqrt;
+    dxdt[0] = u[0];
+    dxdt[1] = -1.0 * p[0] * x[1] / sqrt(u[0] * u[0] + 1e-4);
+  }
+  void outputs(const Scalar* x, Scalar* y) const { y[0] = x[0]; }
+};
+
+std::shared_ptr<const Model> sideways() {
+  ModelDescription about;
+  about.name = "sideways";
+  about.states = {{.name = "x", .unit = "m", .meaning = "position"},
+                  {.name = "v", .unit = "m/s", .meaning = "lateral speed"}};
+  about.inputs = {{.name = "u", .unit = "m/s", .meaning = "speed"}};
+  about.parameters = {{.name = "c", .unit = "m/s^2", .meaning = "of the tyre", .nominal = 1.0}};
+  about.outputs = {{.name = "x", .unit = "m", .meaning = "position"}};
+  about.roles = {.position_x = 0, .speed = 0};
+  return std::make_shared<FormulaModel<Sideways>>(Sideways<double>(), about);
+}
+
 StepRequirement of(const Model& model, double duration, double period = 1e3) {
   const OperatingPoint point{.state = {0, 1, 0, 0}, .inputs = {1}, .parameters = {period}};
   return step_requirement(model, {&point, 1}, duration);
@@ -162,6 +186,15 @@ TEST(OperatingPoints, LieWithinTheBoundsAndMoveEveryInput) {
   EXPECT_EQ(most, 1.0);
   EXPECT_TRUE(without_slip);
   EXPECT_TRUE(with_slip);
+}
+
+TEST(OperatingPoints, KnowWhatStandingAsksFor) {
+  const auto model = sideways();
+  const std::vector<double> nominal = {1.0};
+  const StepRequirement needed =
+      step_requirement(*model, operating_points(*model, model->description(), nominal, 1.0), 0.2);
+  EXPECT_NEAR(needed.time_constant, 0.01, 1e-4) << "of the slowest speed, that of a stop";
+  EXPECT_GE(needed.stable_substeps, 8) << "0.2 s / (2.785 x 0.01 s)";
 }
 
 TEST(StepError, IsThatOfTwiceAsManyStepsInTypicalMagnitudes) {
