@@ -60,6 +60,7 @@ OffsetWatch::OffsetWatch(const Model& model, const std::vector<Watched>& outputs
     watched_of_[each.output] = static_cast<int>(outputs_.size());
     outputs_.push_back(each.output);
     rivals_.push_back(each.rival);
+    biases_.push_back(each.bias);
     first_slot_.push_back(is_single ? first_shared : slots);
     slots_.push_back(is_single ? most_onsets : onsets_of_rivals);
     if (!is_single) slots += onsets_of_rivals;
@@ -304,6 +305,35 @@ void OffsetWatch::adopt(int output, double change, double variance) noexcept {
   known.is_off = known.value * known.value > negligible * negligible * variance;
   if (!known.is_off) known = {};
   forget_onsets();
+}
+
+/// With x = x^ - V e for an error e of the offset b^, the bias beta + b^ + e has the sensitivity 1 - V_beta to e.
+int OffsetWatch::hand_over(WalkingFilter& filter) noexcept {
+  for (std::size_t k = 0; k < known_.size(); ++k) {
+    const int bias = biases_[k], lane = lane_of_known(k);
+    if (bias < 0 || !known_[k].is_off || known_[k].age < for_good) continue;
+    const Constant error = constant(lane);
+    auto sensitivity = sensitivities_.columns.col(lane);
+    sensitivity[bias] -= 1.0;
+    filter.mean() -= sensitivity * error.value();
+    filter.mean()[bias] += known_[k].value;
+    clip(filter.mean().tail(std::ssize(parameter_lower_)));
+    add_square(sensitivity, 1.0 / error.information, filter.covariance());
+    known_[k] = {};
+    forget_onsets();
+    return outputs_[k];
+  }
+  return -1;
+}
+
+bool OffsetWatch::move_bias(int output, double change, double variance, WalkingFilter& filter) noexcept {
+  const int k = watched_of_[static_cast<std::size_t>(output)];
+  const int bias = k < 0 ? -1 : biases_[static_cast<std::size_t>(k)];
+  if (bias < 0) return false;
+  filter.mean()[bias] += change;
+  filter.covariance()(bias, bias) += variance;
+  forget_onsets();
+  return true;
 }
 
 /// An offset that was adopted is none.

@@ -23,11 +23,14 @@ namespace rhec {
 /// Allocates in its constructor only.
 class OffsetWatch {
  public:
+  static constexpr int for_good = 25;  ///< what has lasted for so many samples that count lasts for good
   struct Watched {
     int output = 0;
     /// Another output of the position, of another device, that measures the same: only their difference is known, and
     /// which of the two is off is not. -1: none, the output is not one of the position.
     int rival = -1;
+    /// The state that is this output's bias and nothing else; -1: none.
+    int bias = -1;
   };
   /// `gate`: standard deviations by which an offset has to differ from none.
   OffsetWatch(const Model& model, const std::vector<Watched>& outputs, const KalmanFilter::Noise& noise, double gate);
@@ -57,6 +60,12 @@ class OffsetWatch {
   void adopt_candidate(WalkingFilter& filter) noexcept { adopt_lane(candidate_, filter); }
   /// Adopts that the offset of an output has changed by this much, known with a variance.
   void adopt(int output, double change, double variance) noexcept;
+
+  /// An output that is off for good, and has a state for its bias: from then on that state is what it is off by, for
+  /// nothing distinguishes them. The filter becomes that. Which output; -1: none.
+  int hand_over(WalkingFilter& filter) noexcept;
+  /// The state that is an output's bias has changed by this much, known with a variance; false if there is none.
+  bool move_bias(int output, double change, double variance, WalkingFilter& filter) noexcept;
 
   /// What said that outputs are off was wrong: offsets that have been adopted of late are none, or at least the filter
   /// does not know.
@@ -128,11 +137,11 @@ class OffsetWatch {
   void find_used_lanes() noexcept;
   void clip(Eigen::VectorXd::SegmentReturnType parameters) const noexcept;
 
-  std::vector<int> outputs_, rivals_;    ///< that are watched
-  std::vector<int> first_slot_, slots_;  ///< by watched output, its places for onsets
-  std::vector<int> watched_of_;          ///< by output, which of these it is; -1: none
-  std::vector<double> most_offset_;      ///< by watched output
-  int position_x_, position_y_;          ///< states
+  std::vector<int> outputs_, rivals_, biases_;  ///< that are watched
+  std::vector<int> first_slot_, slots_;         ///< by watched output, its places for onsets
+  std::vector<int> watched_of_;                 ///< by output, which of these it is; -1: none
+  std::vector<double> most_offset_;             ///< by watched output
+  int position_x_, position_y_;                 ///< states
   std::vector<double> parameter_lower_, parameter_upper_;
   double limit_;
   std::vector<Onset> onsets_;  ///< first those of offsets that have been there for ever, one for each watched output

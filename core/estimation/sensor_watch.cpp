@@ -44,6 +44,42 @@ int sensor_of(int output, const std::vector<Sensor>& sensors) noexcept {
   return -1;
 }
 
+/// The state that is an output's bias: it stays as it is, no other state moves with it, no other output has it, and the
+/// output is larger by it. -1: none.
+int bias_of(const WalkingFilter& filter, int output) {
+  const Model& model = filter.model();
+  const int nx = model.state_count(), nu = model.input_count(), np = model.parameter_count();
+  // At a point where everything moves: of a vehicle that stands much else stays as it is.
+  const ModelDescription& about = model.description();
+  std::vector<double> state, inputs, parameters = nominal_values(about.parameters);
+  for (const Variable& each : about.states) state.push_back(std::clamp(0.3 * each.scale, each.lower, each.upper));
+  for (const Variable& each : about.inputs) inputs.push_back(std::clamp(each.scale, each.lower, each.upper));
+  for (std::size_t k = 0; k < parameters.size(); ++k)
+    if (parameters[k] == 0.0)
+      parameters[k] = std::clamp(about.parameters[k].scale, about.parameters[k].lower, about.parameters[k].upper);
+  const std::vector<double> data(model.data_count(), 0.0);
+  Eigen::MatrixXd jacobian(nx, nx + nu + np);
+  const double duration = 0.1;
+  model.integrate({.count = 1,
+                   .states = state.data(),
+                   .inputs = inputs.data(),
+                   .parameters = parameters.data(),
+                   .durations = &duration,
+                   .data = data.data(),
+                   .jacobians = jacobian.data()});
+  for (int i = 0; i < nx; ++i) {
+    if (filter.derivative(output, i) != 1.0) continue;
+    bool is_bias = true;
+    for (int j = 0; j < model.output_count(); ++j) is_bias = is_bias && (j == output || !filter.depends_on(j, i));
+    for (int k = 0; k < nx; ++k) {
+      const double kept = k == i ? 1.0 : 0.0;
+      is_bias = is_bias && jacobian(i, k) == kept && jacobian(k, i) == kept;
+    }
+    if (is_bias) return i;
+  }
+  return -1;
+}
+
 /// The outputs of which offsets show, by what a filter expects. Where the vehicle is, the offset of one output does
 /// not; of several that measure the same, the differences to the best one do.
 std::vector<OffsetWatch::Watched> watched_outputs(const WalkingFilter& filter, const std::vector<double>& variances) {
@@ -56,7 +92,7 @@ std::vector<OffsetWatch::Watched> watched_outputs(const WalkingFilter& filter, c
   const int count = static_cast<int>(about.size());
   for (int j = 0; j < count; ++j) {
     if (by_x(j) == 0.0 && by_y(j) == 0.0) {
-      watched.push_back({.output = j});
+      watched.push_back({.output = j, .bias = bias_of(filter, j)});
       continue;
     }
     int best = j;
@@ -417,7 +453,8 @@ SensorWatch::Finding SensorWatch::judge(double time, double* outputs, const doub
       } else if (is_found) {
         memory_->offsets->adopt_suspected(filter);
       }
-      if (is_told || is_found) {
+      const bool has_jumped = !is_told && !is_found && follow_biases(filter);
+      if (is_told || is_found || has_jumped) {
         end_dispute();
         finding.rebase = true;
       }
@@ -478,7 +515,9 @@ bool SensorWatch::admits(std::size_t sensor, const Innovation& innovation) noexc
       record.error = innovation.value;
       record.covariance = innovation.covariance;
     } else {
-      record.error += (innovation.value - record.error) / error_memory;
+      const Innovation::OfSensor<1> rest = innovation.value - record.error;
+      if (squared_size(rest, innovation.covariance) > limits_[innovation.value.size()]) record.steady = 0;
+      record.error += rest / error_memory;
     }
     if (record.failures == 0) record.after_gap = comes_back;
     ++record.failures;
@@ -489,6 +528,30 @@ bool SensorWatch::admits(std::size_t sensor, const Innovation& innovation) noexc
   if (is_suspect && record.passes < (is_kept_out ? passes_of_kept_out : passes_of_suspects)) return false;
   record = {};
   return true;
+}
+
+/// A sensor that is off for good, and has a state for its bias: nothing distinguishes them, so that the state is what
+/// it is off by. So is the error of one that fails by the same one again and again, where nothing else is wrong.
+bool SensorWatch::follow_biases(WalkingFilter& filter) noexcept {
+  if (const int output = is_disputed_ ? -1 : memory_->offsets->hand_over(filter); output >= 0) {
+    findings_[static_cast<std::size_t>(sensor_of(output, sensors_))] |= reason::moved;
+    return true;
+  }
+  for (Record& record : records_) record.steady += memory_->is_counted && record.failures > 0;
+  const auto is_wrong = [](std::uint32_t finding) { return finding != 0; };
+  if (is_position_disputed() || input_findings_ != 0 || std::ranges::count_if(findings_, is_wrong) != 1) return false;
+  for (std::size_t s = 0; s < sensors_.size(); ++s) {
+    Record& record = records_[s];
+    if (std::min(record.steady, record.failures) < OffsetWatch::for_good || record.error.size() != 1 ||
+        sensors_[s].outputs.size() != 1)
+      continue;
+    const int output = sensors_[s].outputs.front();
+    if (!memory_->offsets->move_bias(output, record.error[0], record.covariance(0, 0), filter)) continue;
+    findings_[s] |= reason::moved;
+    record = {};
+    return true;
+  }
+  return false;
 }
 
 /// Whether a measurement is nearer to the error that the sensor has had than to none, or farther from none than it
