@@ -78,6 +78,7 @@ PathFollower::PathFollower(const Path& path, Window window) : path_(&path), wind
 }
 
 void PathFollower::reset(double arc_length) noexcept {
+  arc_length = std::min(std::max(arc_length, 0.0), path_->length());
   last_ = {.arc_length = arc_length};
   section_ = 0;
   while (section_ + 1 < path_->section_count() && arc_length >= path_->section_end(section_)) ++section_;

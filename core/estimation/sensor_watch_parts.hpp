@@ -55,6 +55,15 @@ struct SensorWatch::Hypothesis {
   }
 };
 
+/// What a sensor has done in a row.
+struct SensorWatch::Record {
+  int failures = 0, passes = 0;
+  int steady = 0;                 ///< samples that count, since when it has failed by one error
+  bool after_gap = false;         ///< the first failure came after a time in which the sensor had said nothing
+  Innovation::OfSensor<1> error;  ///< mean innovation of those that failed
+  Innovation::OfSensor<Eigen::Dynamic> covariance;  ///< of the first of these
+};
+
 /// What was known after the last samples, and the motion since then.
 struct SensorWatch::Memory {
   static constexpr double unknown = std::numeric_limits<double>::quiet_NaN();

@@ -33,17 +33,22 @@ LimitCosts limit_costs(const Ocp& ocp, int stage, const double* values) noexcept
   return costs;
 }
 
-double slack_costs(const StageQp& qp, StageRange range) noexcept {
-  double costs = 0.0;
+LimitCosts limit_costs(const StageQp& qp, StageRange range) noexcept {
+  LimitCosts costs;
   for (int i = range.first; qp.has_limits() && i <= range.last; ++i)
     for (int r = 0; r < qp.limits(i); ++r) {
-      const double slack = std::max({0.0, qp.limit_lower(i)[r], -qp.limit_upper(i)[r]});
-      if (slack == 0.0) continue;
+      const double excess = std::max(qp.limit_lower(i)[r], -qp.limit_upper(i)[r]);
+      if (!(excess > 0.0)) continue;
       const double linear = qp.limit_linear(i)[r];
-      if (linear < infinity) costs += (linear + 0.5 * qp.limit_quadratic(i)[r] * slack) * slack;
+      if (linear < infinity)
+        costs.slack += (linear + 0.5 * qp.limit_quadratic(i)[r] * excess) * excess;
+      else
+        costs.violation += excess;
     }
   return costs;
 }
+
+double slack_costs(const StageQp& qp, StageRange range) noexcept { return limit_costs(qp, range).slack; }
 
 std::unique_ptr<Linearisation> Ocp::make_linearisation() const { return std::make_unique<Linearisation>(*this); }
 

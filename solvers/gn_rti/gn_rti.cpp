@@ -107,6 +107,8 @@ void GnRti::setup(const Ocp& ocp) {
 
 void GnRti::reset() noexcept {
   is_prepared_ = is_pending_ = false;
+  expected_limits_ = {};
+  expected_objective_ = 0.0;
   if (linearisation_) linearisation_->forget();
   qp_solver_.reset();
   choice_.reset();
@@ -174,7 +176,7 @@ Report GnRti::feedback(Iterate& iterate, Clock::time_point deadline) noexcept {
       report = real_time(iterate, deadline);
     } else if (is_sound_start(*ocp_, iterate, scratch_)) {
       report = converge(iterate, deadline);
-      if (!limits_.empty()) expected_limits_ = costs_now(linearisation_->qp());
+      expected_limits_ = limit_costs(linearisation_->qp(), all_stages(*ocp_));
       expected_objective_ = report.objective;
     }
   }
@@ -188,7 +190,6 @@ Report GnRti::real_time(Iterate& iterate, Clock::time_point deadline) noexcept {
   qp_solver_.set_cheap(true);
   bool is_ready = is_prepared_ && linearisation_->is_at(iterate);
   int steps = options_.iterations;
-  evades_ = false;
   for (int iteration = 0; iteration < steps; ++iteration) {
     if (iteration > 0 && is_past(deadline)) {
       report.status = Status::deadline;
@@ -252,7 +253,7 @@ Report GnRti::real_time(Iterate& iterate, Clock::time_point deadline) noexcept {
 bool GnRti::is_surprised() const noexcept {
   if (limits_.empty() || options_.hessian == Curvature::exact) return false;
   const StageQp& qp = linearisation_->qp();
-  const LimitCosts now = costs_now(qp);
+  const LimitCosts now = limit_costs(qp, all_stages(*ocp_));
   const double slack = now.slack - expected_limits_.slack, violation = now.violation - expected_limits_.violation;
   if (!(slack > 0.0) && !(violation > 0.0)) return false;
   const double unit = 1.0 + largest_gradient(qp), more = slack + hard_price * unit * violation;
@@ -276,7 +277,7 @@ void GnRti::clip_active_controls(Iterate& iterate) const noexcept {
 /// Linearises at a new iterate, as the next sample will need it; false if the result is not finite.
 bool GnRti::assess_step(const Iterate& iterate, Report& report) noexcept {
   double objective = linearisation_->linearise_for_residual(iterate, hessian());
-  const LimitCosts limits = limits_.empty() ? LimitCosts{} : costs_now(linearisation_->qp());
+  const LimitCosts limits = limit_costs(linearisation_->qp(), all_stages(*ocp_));
   objective += limits.slack;
   const KktResidual kkt = kkt_residual(linearisation_->qp(), iterate);
   if (!std::isfinite(objective) || !std::isfinite(kkt.stationarity)) return false;

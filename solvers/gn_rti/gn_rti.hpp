@@ -41,10 +41,14 @@ struct GnRtiOptions {
 /// `prepare` linearises at the guess and factorises with the active set that the guess' multipliers imply; `feedback`
 /// then needs vector operations only, unless the newest data change the active set. `finish` linearises at the new
 /// iterate. The next guess is that iterate shifted by one stage, so `prepare` has at most one interval left to
-/// evaluate. Where limits have appeared in the way of the guess, that sample is solved as in mode `converge`: full
-/// steps from a plan through an obstacle may end, and stay, at a saddle point. Estimation problems have small residuals
+/// evaluate.
+/// Estimation problems have small residuals
 /// and use the Gauss-Newton Hessian. Control problems under slip have large residuals, on which Gauss-Newton does not
 /// even converge locally; they use the exact Hessian with the guess' costates, convexified inside the recursion.
+///
+/// From a plan through what has just appeared in its way, as an obstacle head-on, exact steps may end, and stay, at a
+/// saddle point, where the plan goes on through it. There a few Gauss-Newton steps are taken in the sample, unless the
+/// exact Hessian was asked for.
 class GnRti final : public Solver {
  public:
   using Options = GnRtiOptions;
@@ -112,9 +116,10 @@ class GnRti final : public Solver {
   bool is_pending_ = false;  ///< the last step is not assessed yet; `step_` holds the iterate before it
   bool use_exact_ = false;
   HessianChoice choice_;  ///< of mode rti
+  // At the end of the last sample of mode rti.
   LimitCosts expected_limits_;
-  double expected_objective_ = 0.0;  ///< of mode rti: at the end of the last sample
-  bool evades_ = false;              ///< what has appeared in the way of the guess: with Gauss-Newton steps
+  double expected_objective_ = 0.0;
+  bool evades_ = false;  ///< what has appeared in the way of the guess: with Gauss-Newton steps
   double defect_penalty_ = 0.0, bound_penalty_ = 0.0;
   bool is_elastic_ = false, was_elastic_ = false;  ///< hard limits have a price in the QP, and had in the last step's
   int penalty_cuts_left_ = 0, futile_ = 0;

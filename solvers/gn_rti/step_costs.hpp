@@ -6,7 +6,6 @@
 #include <cmath>
 #include <cstddef>
 
-#include "rhec/core/ocp/ocp.hpp"
 #include "rhec/core/qp/iterate.hpp"
 #include "rhec/core/qp/stage_qp.hpp"
 
@@ -41,23 +40,6 @@ inline double violation_after(const StageQp& qp, const Iterate& step) noexcept {
     for (int r = 0; r < qp.limits(i); ++r)
       if (!std::isfinite(qp.limit_linear(i)[r])) violation += excess_after(qp, step, i, r);
   return violation;
-}
-
-/// What limits cost where the QP was linearised.
-inline LimitCosts costs_now(const StageQp& qp) noexcept {
-  LimitCosts costs;
-  for (int i = 0; i <= qp.intervals(); ++i) {
-    for (int r = 0; r < qp.limits(i); ++r) {
-      const double excess = std::max(qp.limit_lower(i)[r], -qp.limit_upper(i)[r]);
-      if (!(excess > 0.0)) continue;
-      const double linear = qp.limit_linear(i)[r];
-      if (std::isfinite(linear))
-        costs.slack += (linear + 0.5 * qp.limit_quadratic(i)[r] * excess) * excess;
-      else
-        costs.violation += excess;
-    }
-  }
-  return costs;
 }
 
 inline double largest_gradient(const StageQp& qp) noexcept {

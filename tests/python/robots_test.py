@@ -138,6 +138,9 @@ def test_what_a_controller_plans_and_says():
     assert driven.controller.violations() == {}
     driven.controller.applied([1.0, 0.0])
     driven.controller.locate()
+    driven.controller.locate(30.0)
+    with pytest.raises(rhec.Error, match="arc_length"):
+        driven.controller.locate(numpy.nan)
     driven.controller.reset()
     driven.controller.finish()
 

@@ -240,6 +240,14 @@ TEST(ControllerReference, StartsOnTheLapThatItIsTold) {
   controller->locate(third);
   controller->control(there);
   EXPECT_NEAR(controller->follower().arc_length(), third, 1e-6);
+  controller->locate(-5.0);
+  controller->control(there);
+  EXPECT_LE(controller->follower().arc_length(), third - 2.0 * lap) << "it is looked for near the start";
+  controller->locate(1e9);
+  EXPECT_TRUE(std::isfinite(controller->control(there).inputs[0]));
+  controller->locate(NAN);
+  controller->control(there);
+  EXPECT_NEAR(controller->follower().arc_length(), third - 2.0 * lap, 1e-6) << "the whole path is searched";
 }
 
 /// Follows the diagonal for so many samples from its tenth metre, looking off the path by an angle, without slip.

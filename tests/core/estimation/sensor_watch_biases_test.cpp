@@ -81,7 +81,7 @@ class Biases : public ::testing::TestWithParam<const char*> {};
 INSTANTIATE_TEST_SUITE_P(All, Biases, ::testing::Values("ekf", "bank", "rhe"), name_of_estimator);
 
 TEST_P(Biases, AreWhatASensorIsOffByForGood) {
-  for (const double jump : {0.0, 0.1, -0.5}) {
+  for (const double jump : {0.0, 0.02, 0.1, -0.5}) {
     SCOPED_TRACE(jump);
     const Seen seen = drive(GetParam(), true, jump, false);
     EXPECT_LT(std::abs(seen.bias - bias - jump), 4.0 * seen.sigma);

@@ -31,7 +31,7 @@ class RHEC_EXPORT PathFollower {
   double advance_with(const PathFollower& other, double x, double y) noexcept;
   /// Moves to where on the whole path the vehicle is (Path::locate). Stays if the position is not finite.
   void locate(double x, double y, double heading) noexcept;
-  /// Moves to an arc length [m], by default to the start.
+  /// Moves to an arc length [m], by default to the start; beyond the path's ends to these.
   void reset(double arc_length = 0.0) noexcept;
 
   double arc_length() const noexcept { return last_.arc_length; }

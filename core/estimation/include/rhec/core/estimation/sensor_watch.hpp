@@ -123,14 +123,9 @@ class RHEC_EXPORT SensorWatch {
   struct Hypothesis;
   struct Memory;
   struct Suspicion;
-  /// Of a sensor, in a row.
-  struct Record {
-    int failures = 0, passes = 0, steady = 0;  ///< steady: samples that count, with one error
-    bool after_gap = false;         ///< the first failure came after a time in which the sensor had said nothing
-    Innovation::OfSensor<1> error;  ///< mean innovation of those that failed
-    Innovation::OfSensor<Eigen::Dynamic> covariance;  ///< of the first of these
-  };
-  bool admits(std::size_t sensor, const Innovation&innovation) noexcept, follow_biases(WalkingFilter&filter) noexcept;
+  struct Record;
+  bool admits(std::size_t sensor, const Innovation& innovation) noexcept;
+  bool follow_biases(WalkingFilter& filter) noexcept;
   bool is_still_off(const Record& record, const Innovation& innovation) const noexcept;
   Measured weighed(const double* outputs) const noexcept;
   void find_stuck(double*outputs) noexcept, note_sample(double time, const double*outputs) noexcept;

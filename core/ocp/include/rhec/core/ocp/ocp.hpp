@@ -129,7 +129,9 @@ struct LimitCosts {
   double slack = 0.0, violation = 0.0;
 };
 RHEC_EXPORT LimitCosts limit_costs(const Ocp& ocp, int stage, const double* values) noexcept;
-/// The slack costs of the stages of a linearisation.
+/// The same of the stages of a linearisation, where it was made.
+RHEC_EXPORT LimitCosts limit_costs(const StageQp& linearisation, StageRange range) noexcept;
+/// Their slack costs alone.
 RHEC_EXPORT double slack_costs(const StageQp& linearisation, StageRange range) noexcept;
 
 }  // namespace rhec
