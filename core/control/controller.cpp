@@ -144,8 +144,10 @@ Controller::Controller(std::shared_ptr<const Model> model, std::shared_ptr<Solve
     for (int i = 1; held_state_[input] >= 0 && i < N; ++i)
       if (!begins_[i]) problem_.input_lower(i, input) = problem_.input_upper(i, input) = 0.0;
   }
-  if (const TermFunctions* terms = problem_.terms().functions())
+  if (const TermFunctions* terms = problem_.terms().functions()) {
     obstacles_.resize(static_cast<std::size_t>(terms->most_obstacles()));
+    obstacle_distances_.resize(obstacles_.size());
+  }
   scratch_.assign(problem_.scratch_size(), 0.0);
   problem_.finish(scratch_);
   if (const std::string reason = solver_->why_not(problem_); !reason.empty())
@@ -193,14 +195,44 @@ void Controller::applied(const double* inputs) noexcept {
     if (!std::isnan(inputs[j])) last_inputs_[j] = inputs[j];
 }
 
+/// How close an obstacle comes to the last plan, or to where the vehicle is on the path, in a circle about it [m].
+double Controller::distance_from_plan(const Obstacle& obstacle) const noexcept {
+  const Roles& roles = vehicle_->description().roles;
+  const double radius = std::max(obstacle.semi_axis_along, obstacle.semi_axis_across);
+  if (!has_plan_) {
+    const PathPoint point = path_.point_at(follower_.arc_length());
+    return std::hypot(obstacle.x - point.x, obstacle.y - point.y) - radius;
+  }
+  double least = std::numeric_limits<double>::infinity(), since = now_ - seen_;
+  for (int i = 0; i <= problem_.intervals(); ++i) {
+    const double* state = point_.state(i);
+    const double x = obstacle.x + since * obstacle.velocity_x, y = obstacle.y + since * obstacle.velocity_y;
+    least = std::min(least, std::hypot(x - state[roles.position_x], y - state[roles.position_y]));
+    if (i < problem_.intervals()) since += problem_.duration(i);
+  }
+  return least - radius;
+}
+
 int Controller::set_obstacles(std::span<const Obstacle> obstacles, double time) noexcept {
   obstacle_count_ = 0;
-  seen_ = std::isfinite(time) ? time : 0.0;
+  seen_ = std::isfinite(time) ? time : now_;
+  const std::size_t room = obstacles_.size();
   for (Obstacle obstacle : obstacles) {
-    if (obstacle_count_ == obstacles_.size()) break;
     // One of which nobody knows when it was there is taken to stay there.
     if (!std::isfinite(time)) obstacle.velocity_x = obstacle.velocity_y = 0.0;
-    if (is_finite(obstacle)) obstacles_[obstacle_count_++] = obstacle;
+    if (!is_finite(obstacle) || room == 0) continue;
+    const double distance = obstacles.size() > room ? distance_from_plan(obstacle) : 0.0;
+    if (obstacle_count_ == room) {
+      const auto farthest = std::ranges::max_element(obstacle_distances_);
+      if (!(distance < *farthest)) continue;
+      // In the order in which they were given, so that rows stay those of the same ones.
+      const auto k = farthest - obstacle_distances_.begin();
+      std::copy(farthest + 1, obstacle_distances_.end(), farthest);
+      std::copy(obstacles_.begin() + k + 1, obstacles_.end(), obstacles_.begin() + k);
+      --obstacle_count_;
+    }
+    obstacle_distances_[obstacle_count_] = distance;
+    obstacles_[obstacle_count_++] = obstacle;
   }
   return static_cast<int>(obstacle_count_);
 }

@@ -26,7 +26,7 @@ constexpr int confirm_step = 3, lead_memory = 20, least_leads = 10;
 Clocks::Clocks(int sources, const Setup& setup) : setup_(setup), sources_(sources) { reset(); }
 
 void Clocks::reset() noexcept {
-  now_ = unknown;
+  first_ = now_ = unknown;
   refused_ = settings_ = 0;
   std::ranges::fill(sources_, Source{});
 }
@@ -76,6 +76,7 @@ double Clocks::use(Source& source, double time) noexcept {
   source.rhythm.hear(time);
   source.times[source.count++ % remembered] = time;
   if (!(now_ >= time)) now_ = time;
+  if (std::isnan(first_)) first_ = time;
   return time;
 }
 

@@ -513,11 +513,15 @@ void Estimator::note_ages(double time) noexcept {
   }
 }
 
+/// Nobody knows when one is to come of which there was none yet: it is missed when it would be silent.
 SensorWatch::Presence Estimator::presence(int source, double time) const noexcept {
   if (!has_started()) return SensorWatch::Presence::present;
-  const double interval = clocks_->usual_interval(source);
-  const double beyond =
-      time - clocks_->newest(source) - std::max(ages_[static_cast<std::size_t>(source)].usual, interval);
+  const double interval = clocks_->usual_interval(source), newest = clocks_->newest(source);
+  if (std::isnan(newest)) {
+    const bool is_missed = time - clocks_->first() > longest_silence(source);
+    return is_missed ? SensorWatch::Presence::silent : SensorWatch::Presence::present;
+  }
+  const double beyond = time - newest - std::max(ages_[static_cast<std::size_t>(source)].usual, interval);
   if (beyond > longest_silence(source) - interval) return SensorWatch::Presence::silent;
   return beyond > overdue * interval ? SensorWatch::Presence::overdue : SensorWatch::Presence::present;
 }
@@ -531,8 +535,8 @@ void Estimator::assess(Estimate& estimate, double time) noexcept {
     if (clocks_->is_suspected(static_cast<int>(s))) reasons |= reason::clock;
   }
   if (clocks_->is_suspected(inputs_source())) reasons |= reason::clock;
-  const bool are_inputs_overdue = presence(inputs_source(), time) != SensorWatch::Presence::present;
-  watch_->assess(estimate, presence_, are_inputs_overdue, reasons, estimate.health);
+  const auto of_inputs = measured_inputs_ > 0 ? presence(inputs_source(), time) : SensorWatch::Presence::present;
+  watch_->assess(estimate, presence_, of_inputs, reasons, estimate.health);
 }
 
 /// What leads beyond a bound, as a steering angle beyond its stop, ends there.

@@ -25,6 +25,8 @@ constexpr double rival_is_off = 0.5;
 constexpr double memory = 100.0;
 // One innovation counts as no more than so many standard deviations: slip that jumps makes large ones, but few.
 constexpr double most_counted = 3.0;
+// The same of one that has lasted.
+constexpr double lasting = 9.0;
 // An offset that differs from none by less than so many standard deviations is none.
 constexpr double negligible = 2.0;
 // By no more than so many is one known that innovations have said: slip makes some that look like one, too, and later
@@ -148,7 +150,7 @@ bool OffsetWatch::has_young(int watched) const noexcept {
 }
 
 /// Where there is no room, the onset gives way that explains the least; the one that explains the most stays.
-void OffsetWatch::begin(int watched, double excess) noexcept {
+void OffsetWatch::begin(int watched, double excess, double left_out) noexcept {
   std::size_t least = onsets_.size();
   const auto worth = [this](std::size_t m) {
     return onsets_[m].watched < 0 || onsets_[m].age > oldest ? -1.0 : constant(static_cast<int>(m)).explained();
@@ -164,7 +166,7 @@ void OffsetWatch::begin(int watched, double excess) noexcept {
   }
   if (least == onsets_.size()) return;
   const auto lane = static_cast<Eigen::Index>(least);
-  onsets_[least] = {.watched = watched, .age = 0, .excess = excess};
+  onsets_[least] = {.watched = watched, .age = 0, .excess = excess, .left_out = left_out};
   set(static_cast<int>(least), {});
   is_off_.row(lane).setZero();
   is_off_(lane, outputs_[watched]) = 1.0;
@@ -240,8 +242,10 @@ void OffsetWatch::take(const WalkingFilter& filter, double excess, bool counts) 
   for (int j = 0; j < filter.model().output_count(); ++j) {
     const KalmanFilter::Use use = filter.use(j);
     if (!(use.variance > 0.0)) continue;
-    const bool is_strange = use.innovation * use.innovation > strange * strange * use.variance;
-    if (const int k = watched_of_[j]; k >= 0 && (is_strange || !has_young(k))) begin(k, excess);
+    const double square = use.innovation * use.innovation / use.variance;
+    const bool is_strange = square > strange * strange;
+    if (const int k = watched_of_[j]; k >= 0 && (is_strange || !has_young(k)))
+      begin(k, excess, std::max(0.0, square - most_counted * most_counted));
     note(filter, j, use);
   }
   suspect_ = refuted_ = candidate_ = -1;
@@ -263,17 +267,54 @@ void OffsetWatch::take(const WalkingFilter& filter, double excess, bool counts) 
     const double usual = m < outputs_.size() ? excess : std::min(excess, each.excess);
     const int lane = static_cast<int>(m);
     // None is more significant than what it explains.
-    if (!(score_[lane] * score_[lane] > most * usual * information_[lane])) continue;
+    if (!(score_[lane] * score_[lane] > (most - each.left_out) * usual * information_[lane])) continue;
     const Constant found = constant(lane);
-    const double significance = found.significance() / usual;
+    double significance = found.significance() / usual;
+    // Slip that has jumped does not just take back what an output was off by.
+    if (each.left_out > 0.0 && ends(each.watched, found)) significance += each.left_out;
     if (!(significance > most) || !is_possible(each.watched, found.value())) continue;
     most = significance;
     candidate_ = lane;
   }
   if (candidate_ < 0) return;
-  const bool is_measured = filter.use(outputs_[onsets_[candidate_].watched]).variance > 0.0;
-  if (is_measured && most > limit_) suspect_ = candidate_;
+  const int watched = onsets_[candidate_].watched;
+  const bool is_measured = filter.use(outputs_[watched]).variance > 0.0;
+  if (is_measured && most > (ends(watched, constant(candidate_)) ? improbable : limit_)) suspect_ = candidate_;
   probability_ = 1.0 / (1.0 + std::exp(0.5 * (even_odds - most)));
+}
+
+/// Whether a change takes back what an output was off by: of all changes the most probable one beforehand.
+bool OffsetWatch::ends(int watched, const Constant& change) const noexcept {
+  const auto k = static_cast<std::size_t>(watched);
+  if (!known_[k].is_off) return false;
+  const double total = known_[k].value + constant(lane_of_known(k)).value(), left = total + change.value();
+  return std::abs(change.value()) > 0.5 * std::abs(total) && left * left * change.information < negligible * negligible;
+}
+
+bool OffsetWatch::can_be_off(int output, double change, double variance) const noexcept {
+  const int k = watched_of_[static_cast<std::size_t>(output)];
+  return k >= 0 && rivals_[static_cast<std::size_t>(k)] < 0 && is_possible(k, change) &&
+         change * change > lasting * variance;
+}
+
+bool OffsetWatch::is_right_again(int output, const Innovation& innovation) const noexcept {
+  const int k = watched_of_[static_cast<std::size_t>(output)];
+  if (k < 0 || innovation.value.size() != 1) return false;
+  const auto watched = static_cast<std::size_t>(k);
+  if (!known_[watched].is_off || rivals_[watched] >= 0) return false;
+  const double rest = innovation.value[0] + known_[watched].value + constant(lane_of_known(watched)).value();
+  return rest * rest < negligible * negligible * innovation.covariance(0, 0);
+}
+
+void OffsetWatch::end(int output, WalkingFilter& filter) noexcept {
+  const auto k = static_cast<std::size_t>(watched_of_[static_cast<std::size_t>(output)]);
+  const Constant error = constant(lane_of_known(k));
+  const auto sensitivity = sensitivities_.columns.col(lane_of_known(k));
+  filter.mean() -= sensitivity * error.value();
+  clip(filter.mean().tail(std::ssize(parameter_lower_)));
+  add_square(sensitivity, 1.0 / error.information, filter.covariance());
+  known_[k] = {};
+  forget_onsets();
 }
 
 bool OffsetWatch::is_possible(int watched, double change) const noexcept {
@@ -292,8 +333,12 @@ void OffsetWatch::adopt_lane(int lane, WalkingFilter& filter) noexcept {
   filter.mean() -= sensitivity * found.value();
   clip(filter.mean().tail(std::ssize(parameter_lower_)));
   add_square(sensitivity, 1.0 / found.information, filter.covariance());
-  const double least = found.value() / most_certain;
-  adopt(outputs_[onsets_[lane].watched], found.value(), std::max(1.0 / found.information, least * least));
+  adopt_mean(outputs_[onsets_[lane].watched], found.value(), 1.0 / found.information);
+}
+
+void OffsetWatch::adopt_mean(int output, double change, double variance) noexcept {
+  const double least = change / most_certain;
+  adopt(output, change, std::max(variance, least * least));
 }
 
 void OffsetWatch::adopt(int output, double change, double variance) noexcept {

@@ -58,6 +58,15 @@ class OffsetWatch {
   void adopt_suspected(WalkingFilter& filter) noexcept;
   /// The same of one that is probable, where something else says so, too.
   void adopt_candidate(WalkingFilter& filter) noexcept { adopt_lane(candidate_, filter); }
+  /// Whether an innovation says that an output which was off is right again: it agrees with what the filter expects as
+  /// it was measured, without what is taken out of it.
+  bool is_right_again(int output, const Innovation& innovation) const noexcept;
+  /// So it is: the filter becomes what is known with the offset that it had, of which nothing is taken out any more.
+  void end(int output, WalkingFilter& filter) noexcept;
+  /// Whether an output is watched by itself, and may be off by this much more, which is known well enough.
+  bool can_be_off(int output, double change, double variance) const noexcept;
+  /// Adopts that. What is not known of it is more than that, as of those that innovations have said.
+  void adopt_mean(int output, double change, double variance) noexcept;
   /// Adopts that the offset of an output has changed by this much, known with a variance.
   void adopt(int output, double change, double variance) noexcept;
 
@@ -109,9 +118,10 @@ class OffsetWatch {
     }
   };
   struct Onset {
-    int watched = -1;     ///< -1: none
-    int age = 0;          ///< [samples that count]
-    double excess = 1.0;  ///< of innovations when it began
+    int watched = -1;       ///< -1: none
+    int age = 0;            ///< [samples that count]
+    double excess = 1.0;    ///< of innovations when it began
+    double left_out = 0.0;  ///< of the first one's square by its variance, since it counts as no more than it may
   };
   struct Known {
     bool is_recent() const noexcept;
@@ -125,7 +135,7 @@ class OffsetWatch {
     return {information_[lane], score_[lane], squares_[lane], count_[lane]};
   }
   void set(int lane, const Constant& constant) noexcept;
-  void begin(int watched, double excess) noexcept;
+  void begin(int watched, double excess, double left_out) noexcept;
   bool has_young(int watched) const noexcept;
   void note(const WalkingFilter& filter, int output, const KalmanFilter::Use& use) noexcept;
   void adopt_lane(int lane, WalkingFilter& filter) noexcept;
@@ -133,6 +143,7 @@ class OffsetWatch {
                 Innovation& innovation) const noexcept;
   bool is_significant(std::size_t watched) const noexcept;
   bool is_possible(int watched, double change) const noexcept;
+  bool ends(int watched, const Constant& change) const noexcept;
   void withdraw(std::size_t watched, WalkingFilter& filter) noexcept;
   void find_used_lanes() noexcept;
   void clip(Eigen::VectorXd::SegmentReturnType parameters) const noexcept;

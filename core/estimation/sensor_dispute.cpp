@@ -23,6 +23,7 @@ constexpr double convincing = 4.6;
 constexpr int fresh = 2;
 // With more than this probability what is disputed is slip that has jumped.
 constexpr double probable = 0.9;
+constexpr double even = 0.5;  // where it is as probable as that the sensor has jumped
 // Slip that has jumped within an interval displaces the vehicle by at least this share of it on the next one again.
 constexpr double goes_on_by = 0.8;
 // So many samples behind slip that was found to have jumped what is disputed may be the same that it was.
@@ -336,11 +337,17 @@ SensorWatch::Finding SensorWatch::settle(double time, const double* outputs) noe
     own_->filter.update(weighed(outputs));
     return accept(*own_);
   }
+  // Of a compass or gyro the next sample tells: slip that has jumped goes on to turn the vehicle, one that has jumped
+  // stays where it is. Both may pass their gates.
+  const bool is_told = !is_position_disputed() && slip_->is_active && moved_->is_active;
+  const double favours_moved = is_told ? likelihood(moved_->filter, true) - likelihood(slip_->filter, true) : 0.0;
   const double likelihood_of_new_slip = consider_slip();
   const bool retracts = retract_slip();
   if (Finding finding; !retracts && consider_other(outputs, finding)) return finding;
   consider_return(time);
   consider_moved(likelihood_of_new_slip);
+  if (is_told && slip_probability_ > 0.0)
+    slip_probability_ = 1.0 / (1.0 + (1.0 / slip_probability_ - 1.0) * std::exp(favours_moved));
   think_again();
   if (!is_blind_) {
     if (!blind_->is_active) start(*blind_);
@@ -349,9 +356,10 @@ SensorWatch::Finding SensorWatch::settle(double time, const double* outputs) noe
   // Slip that has jumped shows from the first sample on. Later the filter without the sensor knows so little that new
   // slip explains nearly anything.
   const bool has_begun_with_it = disputed_samples_ - slip_->explained < fresh;
-  // Slip that would have to leave its bounds for what a compass says explains nothing of it, nor does slip that jumps
-  // once the compass has been wrong already.
-  const bool may_be_slip = is_position_disputed() || (has_begun_with_it && is_within_bounds(slip_->filter.mean()));
+  // Slip that would have to leave its bounds for what a compass says explains nothing of it, nor does slip that is less
+  // likely than an error, or jumps once the compass has been wrong already.
+  const bool is_likely = slip_probability_ > even && is_within_bounds(slip_->filter.mean());
+  const bool may_be_slip = is_position_disputed() || (has_begun_with_it && is_likely);
   if (has_come_back()) return come_back();
   if (may_be_slip && slip_->explained >= (has_begun_with_it ? setup_.slip_proof : setup_.proof)) {
     // What has explained much, or follows a gap, is not doubted for what comes next.

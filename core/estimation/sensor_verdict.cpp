@@ -143,14 +143,15 @@ void SensorWatch::note_volume(const Estimate& estimate) noexcept {
     usual_volume_ += (volume - usual_volume_) / volume_memory;
 }
 
-void SensorWatch::assess(const Estimate& estimate, std::span<const Presence> presence, bool are_inputs_overdue,
+void SensorWatch::assess(const Estimate& estimate, std::span<const Presence> presence, Presence inputs,
                          std::uint32_t reasons, Health& health) noexcept {
   health.reasons = reasons;
   health.sensors.assign(states_.begin(), states_.end());
   health.inputs = inputs_;
   health.covariance_factor = covariance_factor();
-  bool has_finding = reasons != 0 || calm_samples_ < setup_.calm || inputs_.reasons != 0;
-  bool is_overdue = are_inputs_overdue;
+  if (inputs == Presence::silent) health.inputs.reasons |= reason::silent;
+  bool has_finding = reasons != 0 || calm_samples_ < setup_.calm || health.inputs.reasons != 0;
+  bool is_overdue = inputs != Presence::present;
   for (std::size_t s = 0; s < sensors_.size(); ++s) {
     if (presence[s] == Presence::silent) health.sensors[s].reasons |= reason::silent;
     is_overdue = is_overdue || presence[s] != Presence::present;

@@ -23,8 +23,6 @@ constexpr int passes_of_suspects = 2;
 // The same of one that is not followed when it moves.
 constexpr int passes_of_kept_out = 5;
 constexpr double close_gate = 3.0;
-// The error of a sensor that fails is a mean over so many of its measurements.
-constexpr double error_memory = 5.0;
 // By so much less nu' S^-1 nu is a measurement much nearer to no error than to that one.
 constexpr double much_nearer = 9.0;
 // A real receiver's errors may be far larger than its noise says, and not Gaussian at all: its gate is as much wider as
@@ -42,6 +40,14 @@ int sensor_of(int output, const std::vector<Sensor>& sensors) noexcept {
   for (std::size_t s = 0; s < sensors.size(); ++s)
     if (std::ranges::find(sensors[s].outputs, output) != sensors[s].outputs.end()) return static_cast<int>(s);
   return -1;
+}
+
+/// Whether an output is the heading. What it is, positions say whatever slips; of a steering angle slip says otherwise.
+bool is_heading(const WalkingFilter& filter, int output) noexcept {
+  const int heading = filter.model().description().roles.heading;
+  for (int i = 0; i < filter.model().state_count(); ++i)
+    if (filter.derivative(output, i) != (i == heading ? 1.0 : 0.0)) return false;
+  return heading >= 0;
 }
 
 /// The state that is an output's bias: it stays as it is, no other state moves with it, no other output has it, and the
@@ -395,7 +401,11 @@ SensorWatch::Finding SensorWatch::judge(double time, double* outputs, const doub
     if (is_blind_) test_inputs(raw_.data());
     unplaced_samples_ = is_placed ? 0 : unplaced_samples_ + is_disputed;
     const int told = is_disputed ? offset_in_dispute() : -1;
-    if (is_disputed) {
+    if (is_disputed && end_offset()) {
+      filter.update(weighed(outputs));
+      end_dispute();
+      finding.rebase = true;
+    } else if (is_disputed) {
       if (is_disputed_ && is_back) end_dispute();
       finding = settle(time, outputs);
     } else if (is_disputed_ && std::ranges::any_of(records_, [](const Record& each) { return each.failures > 0; })) {
@@ -483,15 +493,27 @@ SensorWatch::Finding SensorWatch::judge(double time, double* outputs, const doub
     is_calm = is_calm && findings_[s] == 0;
     quiet_[s] = findings_[s] ? 0 : quiet_[s] + is_expected(s);
     if (findings_[s]) states_[s].reasons = findings_[s] | (states_[s].reasons & reason::moved);
-    const bool has_moved = (states_[s].reasons & reason::moved) != 0;
-    const int calm = has_moved && !memory_->was_return ? setup_.calm_after_moving : setup_.calm;
-    if (quiet_[s] >= calm) states_[s].reasons = 0;
   }
   calm_samples_ = is_calm ? calm_samples_ + counted : 0;
   if (input_findings_) inputs_.reasons = input_findings_;
   if (calm_samples_ >= setup_.calm) inputs_.reasons = 0;
   input_findings_ = 0;
+  forget_reasons();
   return finding;
+}
+
+/// What sensors were doubted for is forgotten once they have been quiet, but not all of it before the estimate is calm:
+/// one that is quick is quiet after fewer samples that count.
+void SensorWatch::forget_reasons() noexcept {
+  const auto is_over = [&](std::size_t s) {
+    const bool has_moved = (states_[s].reasons & reason::moved) != 0;
+    return quiet_[s] >= (has_moved && !memory_->was_return ? setup_.calm_after_moving : setup_.calm);
+  };
+  bool is_any_left = inputs_.reasons != 0 || calm_samples_ >= setup_.calm;
+  for (std::size_t s = 0; s < sensors_.size(); ++s)
+    is_any_left = is_any_left || (states_[s].reasons != 0 && !is_over(s));
+  for (std::size_t s = 0; s < sensors_.size() && is_any_left; ++s)
+    if (is_over(s)) states_[s].reasons = 0;
 }
 
 /// Whether a sensor's measurement may be used. One that has failed for some time must agree well, and twice: the filter
@@ -505,23 +527,17 @@ bool SensorWatch::admits(std::size_t sensor, const Innovation& innovation) noexc
   const bool is_suspect = record.failures >= suspect_after;
   const auto degrees = static_cast<double>(innovation.value.size());
   const bool is_kept_out = record.failures > 0 && !record.after_gap && !sees_position(sensors_[sensor].outputs);
-  const bool is_off = is_kept_out && is_still_off(record, innovation);
+  const bool is_off = is_kept_out && is_still_off(sensor, innovation);
   const bool passes = innovation.nis <= limit(sensor, innovation.value.size()) && !is_off;
   double& excess = excesses_[sensor];
   if (record.failures < suspect_after)
     excess += (std::min(innovation.nis / degrees, most_excess) - excess) / excess_memory;
   if (!passes) {
-    if (record.failures == 0 || record.error.size() != innovation.value.size()) {
-      record.error = innovation.value;
-      record.covariance = innovation.covariance;
-    } else {
-      const Innovation::OfSensor<1> rest = innovation.value - record.error;
-      if (squared_size(rest, innovation.covariance) > limits_[innovation.value.size()]) record.steady = 0;
-      record.error += rest / error_memory;
-    }
     if (record.failures == 0) record.after_gap = comes_back;
-    ++record.failures;
-    record.passes = 0;
+    const auto size = static_cast<std::size_t>(innovation.value.size());
+    record.note_failure(innovation, limits_[size], close_limits_[size]);
+    const bool is_right_again = memory_->offsets->is_right_again(sensors_[sensor].outputs.front(), innovation);
+    record.right_again = is_right_again ? record.right_again + 1 : 0;
     return false;
   }
   ++record.passes;
@@ -530,14 +546,29 @@ bool SensorWatch::admits(std::size_t sensor, const Innovation& innovation) noexc
   return true;
 }
 
+/// A sensor that was off and is right again shows what slip that jumps might show, too; but that would have to lead
+/// just there where it agrees as it was measured.
+bool SensorWatch::end_offset() noexcept {
+  bool is_any = false;
+  for (std::size_t s = 0; s < sensors_.size(); ++s) {
+    if (records_[s].right_again < passes_of_suspects) continue;
+    memory_->offsets->end(sensors_[s].outputs.front(), own_->filter);
+    records_[s] = {};
+    is_any = true;
+  }
+  return is_any;
+}
+
 /// A sensor that is off for good, and has a state for its bias: nothing distinguishes them, so that the state is what
-/// it is off by. So is the error of one that fails by the same one again and again, where nothing else is wrong.
+/// it is off by. So is the error of one that fails by the same one again and again, where nothing else is wrong; one
+/// without such a state is off by that.
 bool SensorWatch::follow_biases(WalkingFilter& filter) noexcept {
   if (const int output = is_disputed_ ? -1 : memory_->offsets->hand_over(filter); output >= 0) {
     findings_[static_cast<std::size_t>(sensor_of(output, sensors_))] |= reason::moved;
     return true;
   }
-  for (Record& record : records_) record.steady += memory_->is_counted && record.failures > 0;
+  for (Record& record : records_)
+    if (memory_->is_counted && record.failures > 0) record.note_time(close_limits_[1]);
   const auto is_wrong = [](std::uint32_t finding) { return finding != 0; };
   if (is_position_disputed() || input_findings_ != 0 || std::ranges::count_if(findings_, is_wrong) != 1) return false;
   for (std::size_t s = 0; s < sensors_.size(); ++s) {
@@ -546,8 +577,13 @@ bool SensorWatch::follow_biases(WalkingFilter& filter) noexcept {
         sensors_[s].outputs.size() != 1)
       continue;
     const int output = sensors_[s].outputs.front();
-    if (!memory_->offsets->move_bias(output, record.error[0], record.covariance(0, 0), filter)) continue;
-    findings_[s] |= reason::moved;
+    const double error = record.error[0];
+    if (memory_->offsets->move_bias(output, error, record.covariance(0, 0), filter))
+      findings_[s] |= reason::moved;
+    else if (is_heading(filter, output) && memory_->offsets->can_be_off(output, record.mean, record.variance_of_mean()))
+      memory_->offsets->adopt_mean(output, record.mean, record.variance_of_mean());
+    else
+      continue;
     record = {};
     return true;
   }
@@ -555,10 +591,17 @@ bool SensorWatch::follow_biases(WalkingFilter& filter) noexcept {
 }
 
 /// Whether a measurement is nearer to the error that the sensor has had than to none, or farther from none than it
-/// could have been when it failed first; but not if it is much nearer to none.
-bool SensorWatch::is_still_off(const Record& record, const Innovation& innovation) const noexcept {
+/// could have been when it failed first; but not if it is much nearer to none. An error that has lasted ends at once:
+/// where the estimate comes to it, which knows little without the sensor, it has not; unless it stays there.
+bool SensorWatch::is_still_off(std::size_t sensor, const Innovation& innovation) const noexcept {
+  const Record& record = records_[sensor];
   const Innovation::OfSensor<1>& value = innovation.value;
   if (record.error.size() != value.size()) return false;
+  if (value.size() == 1 && record.steady >= OffsetWatch::for_good && record.agrees < OffsetWatch::for_good) {
+    const double noise = setup_.noise.output_variances[static_cast<std::size_t>(sensors_[sensor].outputs.front())];
+    const double jump = std::abs(value[0] - record.error[0]);
+    if (jump * jump < close_gate * close_gate * noise || jump < 0.5 * std::abs(record.mean)) return true;
+  }
   const Innovation::OfSensor<1> rest = value - record.error;
   const double of_error = squared_size(rest, innovation.covariance);
   if (of_error > innovation.nis + much_nearer) return false;

@@ -18,6 +18,7 @@
 #include "offset_watch.hpp"
 #include "past_places.hpp"
 #include "rhec/core/estimation/sensor_watch.hpp"
+#include "sensor_record.hpp"
 #include "stuck_values.hpp"
 #include "walking_filter.hpp"
 
@@ -53,15 +54,6 @@ struct SensorWatch::Hypothesis {
     copy_numbers(filter.mean(), before_mean);
     copy_numbers(filter.covariance(), before_covariance);
   }
-};
-
-/// What a sensor has done in a row.
-struct SensorWatch::Record {
-  int failures = 0, passes = 0;
-  int steady = 0;                 ///< samples that count, since when it has failed by one error
-  bool after_gap = false;         ///< the first failure came after a time in which the sensor had said nothing
-  Innovation::OfSensor<1> error;  ///< mean innovation of those that failed
-  Innovation::OfSensor<Eigen::Dynamic> covariance;  ///< of the first of these
 };
 
 /// What was known after the last samples, and the motion since then.

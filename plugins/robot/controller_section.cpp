@@ -213,21 +213,41 @@ void ControllerSection::add_blockings(Controller::Setup& setup, int intervals) c
   }
 }
 
-void ControllerSection::add_terms(Controller::Setup& setup) const {
+/// One by one, so that a vehicle that does not suit is told where the term stands.
+TermFunctions ControllerSection::functions_of(const Settings& item) const {
+  const PluginChoice choice = in_list.choice(item);
+  if (choice.name.empty()) throw item.error("a term without a name; expected the key 'name' with that of a term");
+  const std::shared_ptr<const Term> term = in_list.make(context_->host, item);
+  try {
+    return {*context_->model, {{choice.name, term, choice.options}}};
+  } catch (const Error& mistake) {
+    throw item.error(mistake.what());
+  }
+}
+
+const std::vector<Settings>& ControllerSection::terms() const {
   const Settings& list = options_.terms;
   if (!list.is_null() && list.kind() != Settings::Kind::list)
     throw list.mismatch("a list of terms, e.g. [{name: corridor, left: 1.5}]");
-  for (const Settings& item : list.items()) {
-    const PluginChoice choice = in_list.choice(item);
-    if (choice.name.empty()) throw item.error("a term without a name; expected the key 'name' with that of a term");
-    setup.problem.terms.push_back({choice.name, in_list.make(context_->host, item), choice.options});
-    // One by one, so that a vehicle that does not suit is told where the term stands.
-    try {
-      TermFunctions(*context_->model, {setup.problem.terms.back()});
-    } catch (const Error& mistake) {
-      throw item.error(mistake.what());
-    }
+  return list.items();
+}
+
+void ControllerSection::add_terms(Controller::Setup& setup) const {
+  for (const Settings& item : terms()) setup.problem.terms.push_back(functions_of(item).terms().front());
+}
+
+std::vector<std::string> ControllerSection::notes() const {
+  std::vector<std::string> notes;
+  for (const Settings& item : terms()) {
+    const TermFunctions functions = functions_of(item);
+    if (functions.limit_count() > 0 || functions.has_residuals()) continue;
+    const Error note = item.error(fmt::format(
+        "the term '{}' has neither a limit nor a cost with these options, and does nothing; 'rhec plugins {}' says "
+        "what it takes",
+        functions.terms().front().name, functions.terms().front().name));
+    notes.emplace_back(note.what());
   }
+  return notes;
 }
 
 std::unique_ptr<Controller> ControllerSection::make(const Path& path, const RobotHooks& hooks,

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <iterator>
 #include <string>
 #include <utility>
 #include <vector>
@@ -129,6 +130,7 @@ std::vector<std::string> Robot::notes() const {
     explicit_sections += explicit_sections.empty() ? "controller" : ", controller";
   if (std::string note = costly_steps_note(*context_, explicit_sections); !note.empty())
     notes.push_back(std::move(note));
+  std::ranges::move(controller_.notes(), std::back_inserter(notes));
   return notes;
 }
 

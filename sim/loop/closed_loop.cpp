@@ -19,9 +19,9 @@ namespace {
 
 // A vehicle farther than this from its path is lost [m].
 constexpr double lost = 50.0;
-// A robot that takes itself to be at the end of its path is there if its estimate is no farther off than this [m]: far
-// more than one that is right errs by.
-constexpr double most_off = 5.0;
+// A robot that takes itself to be at the end of its path is there if its estimate is no farther off than this, and the
+// vehicle no farther beside the path [m]: far more than one that is right errs by, or one that lags behind.
+constexpr double most_off = 5.0, most_beside = 10.0;
 
 /// Sums of absolute and squared errors.
 class Errors {
@@ -176,18 +176,19 @@ RunLog run_closed_loop(const Scenario& scenario, const LoopHooks& hooks) {
     if (hooks.sampled) hooks.sampled({k, time, estimator.get(), &estimate, controller.get(), &command});
     if (hooks.progress) hooks.progress(std::min(1.0, true_follower.arc_length() / scenario.path().length()));
 
-    if (true_follower.finished()) {
-      log.completed = true;
-      log.ended = "the end of the path was reached";
-      break;
-    }
-    if (controller->finished()) {  // by what the robot knows
+    // By where it is, or by what the robot knows.
+    if (true_follower.finished() || controller->finished()) {
       const double off = std::hypot(truth.state()[roles.position_x] - estimate.state[roles.position_x],
                                     truth.state()[roles.position_y] - estimate.state[roles.position_y]);
-      log.completed = off < most_off;
-      log.ended = log.completed
-                      ? "the end of the path was reached"
-                      : fmt::format("the robot takes itself to be at the end of the path, and is {:.3g} m off", off);
+      const double beside = std::abs(true_follower.lateral());
+      if (!true_follower.finished() && !(off < most_off)) {
+        log.ended = fmt::format("the robot takes itself to be at the end of the path, and is {:.3g} m off", off);
+      } else if (!(beside < most_beside)) {
+        log.ended = fmt::format("the vehicle has passed the end of the path {:.3g} m beside it", beside);
+      } else {
+        log.completed = true;
+        log.ended = "the end of the path was reached";
+      }
       break;
     }
     if (!(std::abs(true_follower.lateral()) < lost)) {

@@ -136,6 +136,9 @@ class Obstacles final : public Term {
 
   static Obstacle read(const Settings& item) {
     const GivenObstacle given = GivenObstacle::table().parse(item, "term 'obstacles'");
+    if (const Settings* radius = item.find("radius"); radius && (item.find("length") || item.find("width")))
+      throw radius->error(
+          "found a radius beside the length and width of an ellipse; expected the radius of a circle, or these");
     try {
       return given.obstacle();
     } catch (const Error& mistake) {

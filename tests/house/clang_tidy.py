@@ -1,11 +1,13 @@
 #!/usr/bin/env python3
 """clang-tidy over the sources of the libraries, plugins and apps.
 
-    clang_tidy.py <source root> <build directory> [--jobs N] [--thorough] [folder or file ...]
+    clang_tidy.py <source root> <build directory> [--jobs N] [--recent N] [--thorough] [folder or file ...]
 
 A file that passed is not looked at again until it, a header of ours that it includes, its flags, .clang-tidy or
-clang-tidy itself changes; what passed is kept in <build directory>/clang-tidy. --thorough, for the night: with checks that
-take long and find little, and each file by itself, so that none has a header from the one before it.
+clang-tidy itself changes; what passed is kept in <build directory>/clang-tidy. --recent N, for a test that begins with
+nothing: what the last N commits have changed, or is not committed, and one in four of the other folders, another one after
+each commit; everything where git does not say what has changed. --thorough, for the night: with checks that take long and
+find little, and each file by itself, so that none has a header from the one before it.
 """
 import argparse
 import collections
@@ -39,6 +41,8 @@ PRECOMPILED = re.compile(r" -Winvalid-pch| -fpch-preprocess| -include \S+cmake_p
 QUICK = ["--extra-arg=-fdelayed-template-parsing"]
 # Of a folder so many sources are looked at together. Where others of it have passed, so few are looked at one by one.
 MOST, FEW = 20, 2
+# With --recent one in so many of the folders that have not changed is looked at.
+OTHERS = 4
 
 
 def singles(entry):
@@ -48,6 +52,36 @@ def singles(entry):
         return [entry]
     return [entry | {"file": source, "command": entry["command"].replace(entry["file"], source)}
             for source in QUOTED.findall(unit.read_text(encoding="utf-8"))]
+
+
+def git(root, *arguments):
+    """What git says of the sources, as lines; None where it says nothing of them."""
+    try:
+        result = subprocess.run(["git", "-C", str(root), *arguments], capture_output=True, text=True)
+    except FileNotFoundError:
+        return None
+    return result.stdout.splitlines() if result.returncode == 0 else None
+
+
+def changed_files(root, commits):
+    """What the last commits have changed, with what is not committed. None: nobody knows, as where there is no git, or
+    so few commits are known that these may be all that a clone has."""
+    known = git(root, "rev-list", "-n", str(commits + 1), "HEAD")
+    if known is None or len(known) <= commits:
+        return None
+    committed = git(root, "diff", "--name-only", known[-1])
+    added = git(root, "ls-files", "--others", "--exclude-standard")
+    if committed is None or added is None:
+        return None
+    changed = {(root / name).resolve() for name in committed + added}
+    # Other rules are rules for all.
+    return None if changed & {root / ".clang-tidy", pathlib.Path(__file__).resolve()} else changed
+
+
+def has_turn(root, folder, turn):
+    """Whether it is a folder's turn, which one in OTHERS has."""
+    name = str(folder.relative_to(root))
+    return int(hashlib.sha256(f"{turn} {name}".encode()).hexdigest(), 16) % OTHERS == 0
 
 
 def checks_option(without):
@@ -84,6 +118,7 @@ def main():
     parser.add_argument("root", type=pathlib.Path)
     parser.add_argument("build", type=pathlib.Path)
     parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--recent", type=int, metavar="N")
     parser.add_argument("--thorough", action="store_true")
     parser.add_argument("only", nargs="*")
     arguments = parser.parse_args()
@@ -112,6 +147,17 @@ def main():
     version = subprocess.run(["clang-tidy", "--version"], check=True, capture_output=True, text=True).stdout
     common = version + (root / ".clang-tidy").read_text() + " ".join(EXTRA + ([] if arguments.thorough else SLOW + QUICK))
     headers = Headers(root)
+    changed = changed_files(root, arguments.recent) if arguments.recent else None
+    if changed is not None:
+        turn = git(root, "rev-parse", "HEAD")[0]
+        # A header is looked at with the first file that includes it.
+        first = {}
+        for file in sorted(entries):
+            for name in headers.closure(file):
+                first.setdefault(name, file)
+        recent = {first[file] for file in changed if file in first}
+        entries = {file: command for file, command in entries.items()
+                   if file in recent or file in changed or has_turn(root, file.parent, turn)}
     header_filter = f"--header-filter=^{re.escape(str(root))}/({'|'.join(house.FOLDERS)})/"
 
     def stamp_of(file):

@@ -13,7 +13,7 @@ import tempfile
 import house
 
 RESERVED = re.compile(r"\b(?:_[A-Z]\w*|\w*__\w*)\b")
-KNOWN = re.compile(r"""__builtin_\w+|__(?:attribute|asm|restrict|VA_ARGS|x86_64|aarch64|clang\w*|GNUC|cplusplus|SANITIZE_\w+|
+KNOWN = re.compile(r"""__builtin_\w+|__(?:attribute|asm|has_include|restrict|VA_ARGS|x86_64|aarch64|clang\w*|GNUC|cplusplus|SANITIZE_\w+|
     SSE\w+|AVX\w+|FMA|ORDER_\w+|BYTE_ORDER|FILE|LINE|rdtscp|libc_\w+|m(?:128|256|512)[di]?)(?:__)?|_GLIBCXX_\w+|_LIBCPP_\w+|_mm\w*""", re.VERBOSE)
 # Raw strings, strings, characters, comments: whichever begins first.
 NO_CODE = re.compile(r'R"(\w*)\(.*?\)\1"|"(?:\\.|[^"\\\n])*"|\'(?:\\.|[^\'\\\n])+\'|//[^\n]*|/\*.*?\*/', re.DOTALL)

@@ -96,6 +96,27 @@ TEST(ControllerTerms, KnowObstaclesThatAreSeenAtRunTime) {
   EXPECT_EQ(drive.controller->set_obstacles({}, 0.0), 0);
 }
 
+TEST(ControllerTerms, KeepTheObstaclesThatComeClosestToThePlan) {
+  const std::string section = "horizon: 15, terms: [{name: obstacles, vehicle_radius: 0.5, most: 2}]";
+  const Obstacle near{.x = 15.0, .y = 0.2, .semi_axis_along = 1.0, .semi_axis_across = 1.0};
+  std::vector<Obstacle> many(20, {.x = 15.0, .y = 40.0, .semi_axis_along = 1.0, .semi_axis_across = 1.0});
+  many.push_back(near);
+  // One that is far now, and will be in the way.
+  many.push_back({.x = 40.0, .y = 40.0, .semi_axis_along = 1.0, .semi_axis_across = 1.0, .velocity_y = -4.0});
+  many.insert(many.end(), 20, {.x = -30.0, .semi_axis_along = 1.0, .semi_axis_across = 1.0});
+  Drive drive(section);
+  // Before the first plan: by the place on the path.
+  EXPECT_EQ(drive.controller->set_obstacles(many, 0.0), 2);
+  for (int k = 0; k < 50; ++k) {
+    const long before = allocation_count();
+    EXPECT_EQ(drive.controller->set_obstacles(many, 0.0), 2);
+    EXPECT_EQ(allocation_count(), before);
+    drive.advance();
+    EXPECT_GT(drive.distance(15.0, 0.2), 1.5 - 0.05) << k;
+  }
+  EXPECT_GT(drive.now.state[0], 16.0) << "it goes on";
+}
+
 /// Exact steps from a plan that leads through its middle stay there, at a saddle point.
 TEST(ControllerTerms, GoAroundAnObstacleThatAppearsHeadOn) {
   for (const char* solver : {"gn_rti", "gn_rti, iterations: 5, residual: 0.01"}) {

@@ -92,6 +92,7 @@ Result drive(const char* estimator_name, const Timing& timing, const Fault& faul
     const Eigen::Vector4d& there = states[static_cast<std::size_t>(std::lround(asked / step))];
     result.samples.push_back({(estimate.state.head<2>() - there.head<2>()).norm(), estimate.health.level,
                               in_words(estimate.health, estimator->watch()->sensors())});
+    EXPECT_NE(result.samples.back().words, "degraded") << fault.name << " at " << asked << ": and why?";
     result.last = estimate;
   }
   result.counts = estimator->counts();

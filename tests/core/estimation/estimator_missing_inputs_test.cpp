@@ -17,7 +17,8 @@ using Input = std::vector<double>;  ///< empty: no message
 
 /// Estimates of a drive with 5 m/s in bends, of which `spoil` changes messages of inputs, by the time since the fault
 /// began.
-std::vector<Estimate> drive(const char* estimator_name, const std::function<Input(double since, Input)>& spoil) {
+std::vector<Estimate> drive(const char* estimator_name, const std::function<Input(double since, Input)>& spoil,
+                            bool has_encoder = true) {
   const Robot robot = watched_robot(estimator_name);
   Eigen::Vector4d truth = Eigen::Vector4d::Zero();
   const auto estimator = robot.make_estimator(truth);
@@ -25,7 +26,8 @@ std::vector<Estimate> drive(const char* estimator_name, const std::function<Inpu
   for (int k = 0; k < 200; ++k) {
     const double time = step * k, since = time - fault_begins, steering_rate = 0.1 * std::cos(0.4 * time);
     if (k % 2 == 0) {
-      const double y[] = {truth[0] - 0.4 * std::cos(truth[2]), truth[1] - 0.4 * std::sin(truth[2]), truth[3]};
+      const double y[] = {truth[0] - 0.4 * std::cos(truth[2]), truth[1] - 0.4 * std::sin(truth[2]),
+                          has_encoder ? truth[3] : nan};
       estimator->push_measurement(time, y);
     }
     const Input input = spoil(since, {5.0, steering_rate});
@@ -76,6 +78,32 @@ TEST_P(MissingInputs, WhatIsMissingHoldsForAWhile) {
   const auto unknown = drive(GetParam(), [](double since, Input u) { return since >= 0.0 ? Input{u[0], nan} : u; });
   for (const Estimate& each : unknown) EXPECT_TRUE(each.state.allFinite() && each.covariance.allFinite());
   EXPECT_GT(unknown.back().covariance(3, 3), held.back().covariance(3, 3));
+}
+
+TEST_P(MissingInputs, AreNamed) {
+  const auto without =
+      drive(GetParam(), [](double since, Input u) { return since > 0.0 && since < 4.0 ? Input{} : u; });
+  for (std::size_t k = 0; k < without.size(); ++k) {
+    const double since = static_cast<double>(k) * step - fault_begins;
+    const Health& health = without[k].health;
+    const bool is_silent = (health.inputs.reasons & reason::silent) != 0;
+    if (since < 0.8 || since > 4.0) {
+      EXPECT_FALSE(is_silent) << since;
+    } else if (since > 1.3 && since < 3.9) {
+      EXPECT_TRUE(is_silent && health.level != HealthLevel::ok) << since;
+    }
+  }
+}
+
+/// A cable that was never plugged in.
+TEST_P(MissingInputs, AndSensorsThatNeverCameAreNamed) {
+  const auto same = [](double, Input u) { return u; };
+  const auto mute = drive(GetParam(), [](double, Input) { return Input{}; }), blind = drive(GetParam(), same, false);
+  for (std::size_t k = 0; k < mute.size(); ++k) {
+    const bool is_missed = static_cast<double>(k) * step > 5.0 + 1e-6;
+    EXPECT_EQ((mute[k].health.inputs.reasons & reason::silent) != 0, is_missed) << k;
+    EXPECT_EQ((blind[k].health.sensors[1].reasons & reason::silent) != 0, is_missed) << k;
+  }
 }
 
 }  // namespace estimator_missing_inputs_test

@@ -92,6 +92,16 @@ TEST(Robot, NotesExplicitStepsThatCostMuch) {
   EXPECT_THAT(robot("").notes(), testing::IsEmpty());
 }
 
+TEST(Robot, NotesTermsThatDoNothing) {
+  const std::string corridor = "{name: corridor, left: 2, right: 2}";
+  const auto notes = [](const std::string& terms) { return robot("controller: {terms: [" + terms + "]}").notes(); };
+  EXPECT_THAT(notes(corridor), testing::IsEmpty());
+  for (const char* const name : {"keep_out", "effort", "obstacles"})
+    EXPECT_THAT(notes(corridor + ", {name: " + name + "}"),
+                ElementsAre(testing::AllOf(HasSubstr("controller.terms"), HasSubstr("the term '" + std::string(name)),
+                                           HasSubstr("does nothing"))));
+}
+
 TEST(Robot, SaysThatASensorIsNotAmongTheUsualOnes) {
   for (const char* const model : {"", "model: bicycle_slip\n", "model: {name: bicycle_slip, wheelbase: 2}\n"})
     for (const char* const noise :

@@ -68,6 +68,8 @@ TEST(Obstacles, AreRefusedInWords) {
   EXPECT_THAT(error_of([] { make("obstacles", "{obstacles: {x: 1}}"); }), HasSubstr("a list of obstacles"));
   EXPECT_THAT(error_of([] { make("obstacles", "{obstacles: [{x: 1, radus: 1}]}"); }),
               HasSubstr("did you mean 'radius'"));
+  EXPECT_THAT(error_of([] { make("obstacles", "{obstacles: [{radius: 1, length: 2, width: 1}]}"); }),
+              HasSubstr("a radius beside the length and width of an ellipse"));
   EXPECT_THAT(error_of([] { make("obstacles", "{obstacles: [{length: 2}]}"); }), HasSubstr("a length and a width"));
   EXPECT_THAT(error_of([] { make("obstacles", "{most: 0, obstacles: [{x: 1}]}"); }), HasSubstr("most: more obstacles"));
 }

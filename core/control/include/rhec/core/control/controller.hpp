@@ -96,9 +96,10 @@ class RHEC_EXPORT Controller {
   /// Says where on the path the vehicle is [m], where that is known: a path may pass the same place more than once, as
   /// laps do. The next call searches near it. A number that is not finite asks for the search of the whole path.
   void locate(double arc_length) noexcept;
-  /// Says which obstacles there are from now on, as they were at a time on the clock of the estimates [s]: those that
-  /// the terms have room for, the first ones. Returns how many that are. They move on with their velocities. One that
-  /// has a number that is not finite is left out; at a time that is not, all are at rest.
+  /// Says which obstacles there are from now on, as they were at a time on the clock of the estimates [s]. Where the
+  /// terms have no room for all, it is those that come closest to the plan that there is, or, before the first one, to
+  /// where the vehicle is on the path. Returns how many they are. They move on with their velocities. One that has a
+  /// number that is not finite is left out; at a time that is not, all are at rest.
   int set_obstacles(std::span<const Obstacle> obstacles, double time) noexcept;
   /// Does work for the next sample in advance; calling it is optional.
   void prepare() noexcept;
@@ -135,6 +136,7 @@ class RHEC_EXPORT Controller {
   void keep_within_bounds() noexcept;
   bool find_plan(Clock::time_point deadline) noexcept;
   double plan_violation() noexcept;
+  double distance_from_plan(const Obstacle& obstacle) const noexcept;
   void measure_violations() noexcept;
   bool faces_away() const noexcept;
 
@@ -165,6 +167,7 @@ class RHEC_EXPORT Controller {
   std::vector<std::uint8_t> drives_;  ///< n_u: whether an input moves the vehicle when it drives straight ahead
   std::vector<std::uint8_t> begins_;
   std::vector<Obstacle> obstacles_;  ///< room for as many as the terms regard; the first `obstacle_count_` are there
+  std::vector<double> obstacle_distances_;  ///< of these from the plan [m]
   std::size_t obstacle_count_ = 0;
   double pace_ = 1.0, wanted_pace_ = 1.0;  ///< share of the path's speeds
   double seen_ = 0.0;                      ///< when these were there [s]

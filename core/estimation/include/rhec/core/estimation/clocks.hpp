@@ -46,6 +46,8 @@ class RHEC_EXPORT Clocks {
   double usual_interval(int source) const noexcept { return usual_interval(sources_[source]); }
   /// Newest time of a source on the timeline; NaN before its first.
   double newest(int source) const noexcept { return sources_[source].rhythm.last(); }
+  /// The first time on the timeline that a stamp of any source was given; NaN before it.
+  double first() const noexcept { return first_; }
   /// Whether the source's last stamp was refused, or its clock has just been set.
   bool is_suspected(int source) const noexcept { return sources_[source].suspects > 0 || sources_[source].steps > 0; }
   std::int64_t refused() const noexcept { return refused_; }
@@ -86,7 +88,7 @@ class RHEC_EXPORT Clocks {
 
   Setup setup_;
   std::vector<Source> sources_;
-  double now_;
+  double first_, now_;
   std::int64_t refused_ = 0, settings_ = 0;
 };
 

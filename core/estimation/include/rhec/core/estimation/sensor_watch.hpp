@@ -115,9 +115,9 @@ class RHEC_EXPORT SensorWatch {
     overdue,  ///< a measurement was to be expected
     silent    ///< it has said nothing for too long
   };
-  /// `presence`: by sensor; `reasons`: those that belong to no sensor.
-  void assess(const Estimate& estimate, std::span<const Presence> presence, bool are_inputs_overdue,
-              std::uint32_t reasons, Health& health) noexcept;
+  /// `presence`: by sensor; `inputs`: that of the measured inputs; `reasons`: those that belong to no sensor.
+  void assess(const Estimate& estimate, std::span<const Presence> presence, Presence inputs, std::uint32_t reasons,
+              Health& health) noexcept;
 
  private:
   struct Hypothesis;
@@ -125,11 +125,11 @@ class RHEC_EXPORT SensorWatch {
   struct Suspicion;
   struct Record;
   bool admits(std::size_t sensor, const Innovation& innovation) noexcept;
-  bool follow_biases(WalkingFilter& filter) noexcept;
-  bool is_still_off(const Record& record, const Innovation& innovation) const noexcept;
+  bool follow_biases(WalkingFilter&filter) noexcept, end_offset() noexcept;
+  bool is_still_off(std::size_t sensor, const Innovation& innovation) const noexcept;
   Measured weighed(const double* outputs) const noexcept;
   void find_stuck(double*outputs) noexcept, note_sample(double time, const double*outputs) noexcept;
-  void note_motion(double duration, const double* inputs) noexcept;
+  void note_motion(double duration, const double*inputs) noexcept, forget_reasons() noexcept;
   bool is_searching() const noexcept, is_expected(std::size_t s) const noexcept, is_heard(std::size_t s) const noexcept;
   int offset_in_dispute() noexcept;
   void start_search(const double* outputs) noexcept;

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <memory>
+#include <string>
+#include <vector>
 
 #include "rhec/core/config/options.hpp"
 #include "rhec/core/control/controller.hpp"
@@ -44,10 +46,14 @@ class RHEC_EXPORT ControllerSection {
   /// Weights and blocking are read only here, since they may not fit the vehicle of a robot that only estimates.
   std::unique_ptr<Controller> make(const Path& path, const RobotHooks& hooks = {},
                                    std::shared_ptr<const SlipAhead> ahead = nullptr) const;
+  /// What is likely not meant, e.g. a term that does nothing.
+  std::vector<std::string> notes() const;
 
  private:
   void add_problem(Controller::Setup& setup, int intervals) const;
   void add_blockings(Controller::Setup& setup, int intervals) const;
+  const std::vector<Settings>& terms() const;
+  TermFunctions functions_of(const Settings& item) const;
   void add_terms(Controller::Setup& setup) const;
 
   std::shared_ptr<const RobotContext> context_;

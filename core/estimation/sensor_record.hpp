@@ -1,0 +1,64 @@
+#pragma once
+
+#include "innovation.hpp"
+#include "offset_watch.hpp"
+#include "rhec/core/estimation/sensor_watch.hpp"
+
+namespace rhec {
+
+/// What a sensor has done in a row.
+struct SensorWatch::Record {
+  int failures = 0, passes = 0;
+  int steady = 0;                 ///< samples that count, since when it has failed by one error
+  int agrees = 0;                 ///< samples that count, since when this error is one that would not have failed
+  int right_again = 0;            ///< failures in a row that it would not have if it were not off any more
+  bool after_gap = false;         ///< the first failure came after a time in which the sensor had said nothing
+  Innovation::OfSensor<1> error;  ///< mean innovation of those that failed
+  Innovation::OfSensor<1> steady_from = {};         ///< what that was when it became steady
+  Innovation::OfSensor<Eigen::Dynamic> covariance;  ///< of the first of these
+  double mean = 0.0;                                ///< of one value since it is steady
+  double variance = 0.0;                            ///< of the newest one's
+  int count = 0;                                    ///< of these
+
+  /// A sample that counts has gone by while the sensor fails. `close_limit`: of one value.
+  void note_time(double close_limit) noexcept {
+    ++steady;
+    agrees = error.size() == 1 && error[0] * error[0] < close_limit * covariance(0, 0) ? agrees + 1 : 0;
+  }
+  /// Of the mean of one value since it is steady: errors of an estimate that goes on without the sensor have to do with
+  /// each other for about as many samples as it takes for good.
+  double variance_of_mean() const noexcept { return variance / (1.0 + steady / double{OffsetWatch::for_good}); }
+  /// An innovation fails whose nu' S^-1 nu from the mean may be `limit`; that of the mean may be `close_limit` since it
+  /// is steady.
+  void note_failure(const Innovation& innovation, double limit, double close_limit) noexcept {
+    // The error of a sensor that fails is a mean over so many of its measurements.
+    constexpr double error_memory = 5.0;
+    passes = 0;
+    variance = innovation.covariance(0, 0);
+    mean += (innovation.value[0] - mean) / ++count;
+    if (failures++ == 0 || error.size() != innovation.value.size()) {
+      error = steady_from = innovation.value;
+      covariance = innovation.covariance;
+      begin_mean(innovation);
+      return;
+    }
+    const Innovation::OfSensor<1> rest = innovation.value - error;
+    error += rest / error_memory;
+    if (steady_from.size() != error.size()) steady_from = error;
+    const Innovation::OfSensor<1> drift = error - steady_from;
+    const bool is_steady =
+        squared_size(rest, innovation.covariance) <= limit && squared_size(drift, innovation.covariance) <= close_limit;
+    if (is_steady) return;
+    steady = 0;
+    steady_from = error;
+    begin_mean(innovation);
+  }
+
+ private:
+  void begin_mean(const Innovation& innovation) noexcept {
+    mean = innovation.value[0];
+    count = 1;
+  }
+};
+
+}  // namespace rhec
