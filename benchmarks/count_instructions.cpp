@@ -41,7 +41,7 @@ void count(const std::string& name, int steps, const std::vector<std::string>& a
       if (steps < 1 || uncounted_steps + steps > static_cast<int>(sequence.samples.size()))
         throw Error("the sequence '" + name + "' has " + std::to_string(sequence.samples.size()) +
                     " samples, of which " + std::to_string(uncounted_steps) + " are not counted");
-      // With --instr-atstart=no the drive until here takes a tenth of the time.
+      // With --instr-atstart=no the drive until here takes less time.
       CALLGRIND_START_INSTRUMENTATION;
       loop.restart();
       for (int k = 0; k < uncounted_steps; ++k) loop.step();

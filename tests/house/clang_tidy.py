@@ -64,18 +64,17 @@ def git(root, *arguments):
 
 
 def changed_files(root, commits):
-    """What the last commits have changed, with what is not committed. None: nobody knows, as where there is no git, or
-    so few commits are known that these may be all that a clone has."""
+    """What the last commits have changed, with what is not committed. None: everything, as the last one has changed the
+    rules, or nobody knows, as where there is no git, or so few commits are known that these may be all that a clone has."""
     known = git(root, "rev-list", "-n", str(commits + 1), "HEAD")
     if known is None or len(known) <= commits:
         return None
     committed = git(root, "diff", "--name-only", known[-1])
+    newest = git(root, "diff", "--name-only", known[1])
     added = git(root, "ls-files", "--others", "--exclude-standard")
-    if committed is None or added is None:
+    if committed is None or newest is None or added is None or ".clang-tidy" in newest:
         return None
-    changed = {(root / name).resolve() for name in committed + added}
-    # Other rules are rules for all.
-    return None if changed & {root / ".clang-tidy", pathlib.Path(__file__).resolve()} else changed
+    return {(root / name).resolve() for name in committed + added}
 
 
 def has_turn(root, folder, turn):
