@@ -163,8 +163,10 @@ bool SensorWatch::consider_other(const double* outputs, Finding& finding) noexce
       WalkingFilter& trial = *memory.trial;
       if (!replay_without(suspicion, trial, false)) continue;
       Record error = own;
-      if (trial.innovation(sensors_[s], weighed(raw_.data()), scratch_))
-        error = {.error = scratch_.value, .covariance = scratch_.covariance};
+      if (trial.innovation(sensors_[s], weighed(raw_.data()), scratch_)) {
+        error = {};
+        error.begin(scratch_);
+      }
       error.failures = std::max(ago, suspect_after);
       finding = accuse(suspicion, error, outputs);
       return true;

@@ -28,6 +28,12 @@ struct SensorWatch::Record {
   /// Of the mean of one value since it is steady: errors of an estimate that goes on without the sensor have to do with
   /// each other for about as many samples as it takes for good.
   double variance_of_mean() const noexcept { return variance / (1.0 + steady / double{OffsetWatch::for_good}); }
+  /// The first innovation that fails.
+  void begin(const Innovation& innovation) noexcept {
+    error = steady_from = innovation.value;
+    covariance = innovation.covariance;
+    begin_mean(innovation);
+  }
   /// An innovation fails whose nu' S^-1 nu from the mean may be `limit`; that of the mean may be `close_limit` since it
   /// is steady.
   void note_failure(const Innovation& innovation, double limit, double close_limit) noexcept {
@@ -35,20 +41,16 @@ struct SensorWatch::Record {
     constexpr double error_memory = 5.0;
     passes = 0;
     variance = innovation.covariance(0, 0);
-    mean += (innovation.value[0] - mean) / ++count;
-    if (failures++ == 0 || error.size() != innovation.value.size()) {
-      error = steady_from = innovation.value;
-      covariance = innovation.covariance;
-      begin_mean(innovation);
-      return;
-    }
+    if (failures++ == 0 || error.size() != innovation.value.size()) return begin(innovation);
     const Innovation::OfSensor<1> rest = innovation.value - error;
     error += rest / error_memory;
-    if (steady_from.size() != error.size()) steady_from = error;
     const Innovation::OfSensor<1> drift = error - steady_from;
     const bool is_steady =
         squared_size(rest, innovation.covariance) <= limit && squared_size(drift, innovation.covariance) <= close_limit;
-    if (is_steady) return;
+    if (is_steady) {
+      mean += (innovation.value[0] - mean) / ++count;
+      return;
+    }
     steady = 0;
     steady_from = error;
     begin_mean(innovation);

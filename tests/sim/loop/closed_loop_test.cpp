@@ -108,6 +108,17 @@ terrain: {name: constant, values: {kappa: 0.87, mu: 1}}
   EXPECT_THAT(stopped.ended, testing::HasSubstr("takes itself to be at the end of the path, and is "));
 }
 
+TEST(Ends, AVehicleThatPassesTheEndFarBesideItIsNotThere) {
+  // Far too fast for a path whose reference does not wait.
+  Settings settings = load_yaml(SCENARIOS "/figure8.yaml");
+  for (const char* assignment : {"speed=40", "controller.reference_speed=literal", "estimator.name=truth"})
+    apply_assignment(settings, assignment);
+  const RunLog log = run_closed_loop({Host(), settings});
+  EXPECT_FALSE(log.completed);
+  EXPECT_THAT(log.ended, testing::HasSubstr("has passed the end of the path "));
+  EXPECT_GT(std::abs(log.samples.back().tracking), 10.0);
+}
+
 TEST(Headlands, AreDrivenInReverse) {
   for (const int seed : {71, 72}) {
     Settings settings = load_yaml(SCENARIOS "/headland.yaml");
