@@ -263,7 +263,8 @@ double Estimator::judged_until(double time) const noexcept {
 void Estimator::push(double time, Measured outputs) noexcept {
   if (!watch_) return push_judged(time, outputs);
   note_delivery(time, outputs);
-  if (!has_started() || time > watched_ + timeline_.tolerance) {
+  // Before anything can be judged, what is late may say where the vehicle begins.
+  if (!has_started() || time > watched_ + timeline_.tolerance || !watch_->is_active()) {
     counts_.dropped += waiting_->is_full();
     waiting_->insert(time, outputs);
     return;
@@ -375,7 +376,14 @@ bool Estimator::judge_waiting(double until, Clock::time_point deadline) noexcept
     if (is_new && is_past(deadline)) return false;
     const double time = waiting_->time(0);
     waiting_->drop_front(merge_waiting(0));
-    const SensorWatch::Finding finding = judge(time, merged_, deadline);
+    const bool is_late_start = has_started() && time < watched_ - timeline_.tolerance;
+    if (is_late_start && watch_->is_active()) {
+      watch_->judge_late(time, merged_.values(), merged_.measured().weights);
+      push_judged(time, merged_.measured());
+      continue;
+    }
+    const SensorWatch::Finding finding =
+        is_late_start ? start_late(time, merged_, deadline) : judge(time, merged_, deadline);
     push_judged(time, merged_.measured(), time <= used_ + timeline_.tolerance);
     ahead_ = missing_value;
     if (finding.release) {
@@ -389,10 +397,10 @@ bool Estimator::judge_waiting(double until, Clock::time_point deadline) noexcept
     }
     bool is_complete = true;
     if (finding.rebase && goes_ahead()) grid_.outdate(time);
-    if (finding.rebase || !watch_->is_active()) is_complete = take_in(time, deadline);
+    if (finding.rebase || !watch_->is_active()) is_complete = take_in(watched_, deadline);
     if (finding.rebase) {
       // What was measured before counts no longer.
-      if (!is_complete) grid_.skip_to(time);
+      if (!is_complete) grid_.skip_to(watched_);
       rebase(watch_->mean(), watch_->covariance());
     }
     // There is nothing to judge the next one by yet.
@@ -452,6 +460,16 @@ SensorWatch::Finding Estimator::judge(double time, MeasuredOutputs& outputs, Clo
   const SensorWatch::Finding finding = watch_->judge(time, outputs.values(), outputs.measured().weights);
   counts_.rejected = 0;
   for (const SensorHealth& sensor : watch_->sensor_states()) counts_.rejected += sensor.rejected;
+  return finding;
+}
+
+/// Where a vehicle of which nothing was known begins, by a measurement that comes late.
+SensorWatch::Finding Estimator::start_late(double time, const MeasuredOutputs& outputs,
+                                           Clock::time_point deadline) noexcept {
+  const SensorWatch::Finding finding = watch_->place_start(outputs.measured().values, outputs.measured().weights);
+  if (finding.rebase)
+    through_motion(time, watched_, deadline,
+                   [&](double begin, double end) { watch_->advance(end - begin, grid_.mean_input(begin, end)); });
   return finding;
 }
 

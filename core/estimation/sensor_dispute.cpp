@@ -388,7 +388,7 @@ SensorWatch::Finding SensorWatch::settle(double time, const double* outputs) noe
     start_moved();
     moved_->filter.update(weighed(raw_.data()));
     moved_->filter.restart_parameters(setup_.parameter_sigmas);
-    search_from(moved_->filter, *memory_->search);
+    search_from(moved_->filter, *memory_->search, raw_.data());
     memory_->places.clear();
     for (Record& record : records_) record = {};
     return accept(*moved_);
@@ -476,7 +476,7 @@ void SensorWatch::think_again() noexcept {
   moved_->filter.update(weighed(raw_.data()));
   WalkingFilter& trial = *memory_->trial;
   go_on_from(moved_->filter, trial);
-  search_from(trial, search);
+  search_from(trial, search, raw_.data());
   moved_->explained = 1;
   memory_->is_jump_known = false;
   memory_->in_vain = 0;

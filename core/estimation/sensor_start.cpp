@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "numbers.hpp"
 #include "sensor_watch_parts.hpp"
 
 // Before there is an estimate to judge by.
@@ -11,20 +12,32 @@ namespace {
 
 // A place that is known less does not become more accurate by what rounding leaves of it [m].
 constexpr double most_displacement = 1e4;
-// A start that is known to be turned by less needs no search [rad].
-constexpr double roughly_known_heading = 1.0;
+// A heading that is known as badly may as well be any [rad].
+constexpr double any_heading = 1.5;
 
 }  // namespace
 
 /// Where the vehicle begins may be known badly, and said to be known well, as the origin of a map in which nobody has
 /// put it. A position that is far from there would then be explained by heading, slip and speed, all of them absurd.
 /// It says where the vehicle is, or is wrong itself: the mean goes there, and the covariance has room for both.
-SensorWatch::Finding SensorWatch::place_start(const double* outputs) noexcept {
+///
+/// Where it heads may not be known at all, and nothing that is measured says so: then it is searched from the first
+/// position on. A filter that begins with one heading and is told that it may be any other takes lever arms, and what
+/// is linear about them, at their word: it is soon certain of a heading, of a vehicle that has not moved.
+SensorWatch::Finding SensorWatch::place_start(const double* outputs, const double* weights) noexcept {
+  raw_weights_.assign(weights, weights ? weights + raw_.size() : nullptr);
   WalkingFilter& filter = own_->filter;
   const Roles& roles = filter.model().description().roles;
   const double most = setup_.initial_covariance.size() > 0 ? filter.covariance().diagonal().maxCoeff() : 0.0;
   if (!(most > 0.0) || roles.position_x < 0 || roles.position_y < 0) return {};
   filter.expect();
+  if (is_heading_open(outputs)) {
+    is_active_ = memory_->is_starting = true;
+    const double sigma = std::sqrt(filter.covariance()(roles.heading, roles.heading));
+    search_from(filter, *memory_->search, outputs, sigma < any_heading ? sigma : infinity);
+    memory_->search->moments(filter.mean(), filter.covariance());
+    return {.rebase = true};
+  }
   bool is_elsewhere = false;
   for (std::size_t s = 0; s < sensors_.size() && !is_elsewhere; ++s)
     is_elsewhere = sees_position(sensors_[s].outputs) && filter.innovation(sensors_[s], weighed(outputs), scratch_) &&
@@ -42,12 +55,31 @@ SensorWatch::Finding SensorWatch::place_start(const double* outputs) noexcept {
   if (!away.allFinite()) return {};
   const double doubt = std::min(0.25 * away.squaredNorm(), most_displacement * most_displacement);
   for (const int i : {roles.position_x, roles.position_y}) filter.covariance()(i, i) += doubt;
-  if (roles.heading >= 0 &&
-      filter.covariance()(roles.heading, roles.heading) > roughly_known_heading * roughly_known_heading) {
-    is_active_ = true;
-    search_from(filter, *memory_->search);
-  }
   return {.rebase = true};
+}
+
+/// Whether where the vehicle heads is not known, and of what is measured positions alone may tell.
+bool SensorWatch::is_heading_open(const double* outputs) noexcept {
+  const WalkingFilter& filter = own_->filter;
+  const Roles& roles = filter.model().description().roles;
+  const auto is_unknown = [&](const WalkingFilter& each) {
+    return each.covariance()(roles.heading, roles.heading) > Memory::known_heading * Memory::known_heading;
+  };
+  if (!memory_->search || !is_unknown(filter)) return false;
+  WalkingFilter& without = *memory_->trial;
+  copy_numbers(filter.mean(), without.mean());
+  copy_numbers(filter.covariance(), without.covariance());
+  bool has_x = false, has_y = false;
+  for (std::size_t j = 0; j < raw_.size(); ++j) {
+    const bool sees_x = filter.depends_on(static_cast<int>(j), roles.position_x),
+               sees_y = filter.depends_on(static_cast<int>(j), roles.position_y);
+    raw_[j] = sees_x || sees_y ? Memory::unknown : outputs[j];
+    has_x = has_x || (sees_x && !std::isnan(outputs[j]));
+    has_y = has_y || (sees_y && !std::isnan(outputs[j]));
+  }
+  if (!has_x || !has_y) return false;
+  without.update(weighed(raw_.data()));
+  return is_unknown(without);
 }
 
 }  // namespace rhec

@@ -159,7 +159,7 @@ void SensorWatch::assess(const Estimate& estimate, std::span<const Presence> pre
   }
   const Roles& roles = own_->filter.model().description().roles;
   const Eigen::MatrixXd& P = estimate.covariance;
-  if (is_searching()) health.reasons |= reason::uncertain;
+  if (is_searching()) health.reasons |= memory_->is_starting ? reason::starting : reason::uncertain;
   bool is_lost = (reasons & reason::starting) != 0;
   if (P.rows() > 0) {
     // What is no variance says that nothing is known. What correlated innovations add to it is no reason to stop.

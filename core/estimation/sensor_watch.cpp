@@ -230,7 +230,7 @@ void SensorWatch::reset() noexcept {
   memory_->stuck.reset();
   memory_->beyond_bounds = 0.0;
   memory_->impossible_samples = 0;
-  memory_->was_open = false;
+  memory_->was_open = memory_->is_starting = false;
   memory_->places.clear();
   memory_->undisputed_samples = setup_.calm;
   std::fill(believed_input_.begin(), believed_input_.end(), 0.0);
@@ -449,7 +449,7 @@ SensorWatch::Finding SensorWatch::judge(double time, double* outputs, const doub
         memory_->impossible_samples = 0;
         beyond = 0.0;
         filter.restart_parameters(setup_.parameter_sigmas);
-        search_from(filter, *memory_->search);
+        search_from(filter, *memory_->search, raw_.data());
         memory_->offsets->forget_onsets();
         end_dispute();
         finding.rebase = true;
@@ -481,7 +481,7 @@ SensorWatch::Finding SensorWatch::judge(double time, double* outputs, const doub
     note_corrected(finding.rebase || finding.release);
     remember(time, outputs);
   }
-  if (!is_active_) finding = place_start(outputs);
+  if (!is_active_) finding = place_start(outputs, weights);
   note_offsets();
   if (is_blind_) input_findings_ |= reason::rejected;
   bool is_calm = input_findings_ == 0;
@@ -627,23 +627,23 @@ void SensorWatch::start_search(const double* outputs) noexcept {
   const Eigen::Index np = filter.model().parameter_count(), nx = filter.mean().size() - np;
   filter.mean().tail(np) = memory_->before_mean.tail(np);
   for (Eigen::Index j = nx; j < nx + np; ++j) filter.covariance()(j, j) = memory_->before_covariance(j, j);
-  search_from(filter, *memory_->search);
+  search_from(filter, *memory_->search, outputs);
 }
 
 /// Starts a search from what a filter knows of each variable by itself.
-void SensorWatch::search_from(WalkingFilter& filter, HeadingSearch& search) noexcept {
+void SensorWatch::search_from(WalkingFilter& filter, HeadingSearch& search, const double* outputs,
+                              double sigma) noexcept {
   for (Eigen::Index c = 0; c < filter.mean().size(); ++c)
     for (Eigen::Index r = 0; r < filter.mean().size(); ++r)
       if (r != c) filter.covariance()(r, c) = 0.0;
-  search.start(filter.mean(), filter.covariance());
+  search.start(filter.mean(), filter.covariance(), weighed(outputs), sigma);
 }
 
 /// All measurements are used: there is nothing that they could be judged by. Found or not, the best heading so far is
 /// the estimate.
 SensorWatch::Finding SensorWatch::search_heading(const double* outputs) noexcept {
-  memory_->search->update(sensors_, weighed(outputs));
-  own_->filter.mean() = memory_->search->best().mean();
-  own_->filter.covariance() = memory_->search->best().covariance();
+  if (memory_->search->update(sensors_, weighed(outputs))) memory_->is_starting = false;
+  memory_->search->moments(own_->filter.mean(), own_->filter.covariance());
   return {.rebase = true};
 }
 

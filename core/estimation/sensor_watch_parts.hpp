@@ -153,6 +153,7 @@ struct SensorWatch::Memory {
   std::unique_ptr<WalkingFilter> trial;   ///< for what is tried within one call
   std::unique_ptr<WalkingFilter> ahead;   ///< behind the last sample that was judged
   std::unique_ptr<HeadingSearch> search;  ///< null for a vehicle without a heading
+  bool is_starting = false;               ///< it is that of the start
   /// The same, of a heading that may be wrong, while it is not known who is.
   std::unique_ptr<HeadingSearch> second_thought;
   std::vector<double> first_errors;  ///< n_y: by how much rejected outputs were off when the dispute began

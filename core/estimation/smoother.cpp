@@ -7,6 +7,8 @@
 namespace rhec {
 namespace {
 
+constexpr double unknown_heading = 0.5;  // [rad]
+
 /// The last node that is not later; the first one, if all are.
 std::ptrdiff_t node_before(const SmoothedRun& run, double time) {
   const auto after = std::upper_bound(run.times.begin(), run.times.end(), time);
@@ -90,6 +92,11 @@ MeasuredInterval NodeLog::interval(int i, int input_count) const noexcept {
 
 void NodeRecorder::estimate(Estimate& result, Clock::time_point deadline) noexcept {
   method_->estimate(result, deadline);
+  // What is guessed of a vehicle that may head anywhere is no start.
+  const int heading = model().description().roles.heading;
+  if (heading >= 0 && heading < result.covariance.rows() &&
+      result.covariance(heading, heading) > unknown_heading * unknown_heading)
+    return;
   const auto node = static_cast<std::ptrdiff_t>(log_->intervals());
   std::copy_n(result.state.data(), result.state.size(), log_->states.data() + node * result.state.size());
   std::copy_n(result.parameters.data(), result.parameters.size(),

@@ -239,6 +239,11 @@ void ControllerSection::add_terms(Controller::Setup& setup) const {
 std::vector<std::string> ControllerSection::notes() const {
   std::vector<std::string> notes;
   for (const Settings& item : terms()) {
+    const Settings *const hard = item.find("hard"), *const soft = item.find("soft");
+    if (hard && soft && hard->flag() == true)
+      notes.emplace_back(soft->error("limits that are hard have no cost, and this says nothing; expected one of `hard: "
+                                     "true` and `soft`")
+                             .what());
     const TermFunctions functions = functions_of(item);
     if (functions.limit_count() > 0 || functions.has_residuals()) continue;
     const Error note = item.error(fmt::format(

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <iterator>
+#include <numbers>
 #include <span>
 #include <utility>
 
@@ -71,6 +73,10 @@ const NumbersByName& delays_by_name() {
   return map;
 }
 
+// Of an angle that may be any, all alike [rad^2].
+constexpr double variance_of_any_angle = std::numbers::pi * std::numbers::pi / 3.0;
+constexpr int starts_of_any_heading = 12;
+
 DefaultByName<double> at_the_origin() {
   DefaultByName<double> origin = constant_default(0.0);
   origin.text += "; in a simulation the true start";
@@ -95,11 +101,17 @@ const NumbersByName& initial_parameters_by_name() {
   return map;
 }
 
+DefaultByName<double> shared_among_states() {
+  DefaultByName<double> share = scaled_default(state_share);
+  share.text += "; of a heading that nothing tells: any is as probable";
+  return share;
+}
+
 const SigmasByName& initial_sigma_by_name() {
   constexpr const char* meaning = "standard deviation at the start";
   static const SigmasByName map(
       "initial sigma", {greater_than(0.0)},
-      {{"STATE", &ModelDescription::states, scaled_default(state_share), meaning},
+      {{"STATE", &ModelDescription::states, shared_among_states(), meaning},
        {"PARAMETER", &ModelDescription::parameters, scaled_default(parameter_share), meaning}});
   return map;
 }
@@ -161,8 +173,11 @@ OptionTable<EstimatorOptions> EstimatorOptions::table(const EstimatorMakers& mak
                "measurements that an interval has room for between its two nodes, each at its own time; if there are "
                "more, it ends early, in a further node",
                between(0, 10000))
-      .integer("heading_starts", &E::heading_starts,
-               "starts around the circle while the heading is unknown; 1: the initial mean is trusted", between(1, 64))
+      .integer(
+          "heading_starts", &E::heading_starts,
+          "starts around the circle while the heading is unknown, as it is at the start if this is above 1 or nothing "
+          "tells it; with health.watch, filters search it instead",
+          between(1, 64))
       .choice("covariance", &E::covariance, {{"bank", BlockCovariance::bank}, {"blocks", BlockCovariance::blocks}},
               "of a window with blocks: that of a bank of filters beside it, with the difference of the two estimates, "
               "which holds; or that of the block model, which leaves out that parameters vary within a block")
@@ -215,7 +230,6 @@ EstimatorSection::EstimatorSection(std::shared_ptr<const RobotContext> context, 
     parts_.walks.push_back({process_noise[j], restart[j], alone[j]});
 
   const InitialOptions initial = InitialOptions::table().parse(options_.initial, "estimator: initial");
-  has_initial_state_ = options_.initial.find("state") != nullptr;
   std::vector<double> mean = initial_state_by_name().read(initial.state, about);
   for (const double value : initial_parameters_by_name().read(initial.parameters, about)) mean.push_back(value);
   Integration integration = integration_of(options_.integrator, options_.substeps, section, parts_.context,
@@ -267,7 +281,30 @@ PluginChoice EstimatorSection::solver_choice() const { return default_solver.cho
 
 EstimatorParts EstimatorSection::parts(const std::optional<Eigen::VectorXd>& initial_state) const {
   EstimatorParts parts = parts_;
-  if (initial_state && !has_initial_state_) parts.initial_mean.head(initial_state->size()) = *initial_state;
+  const Settings* const initial = parts_.section.find("initial");
+  const auto is_stated = [&](const char* what, int state) {
+    const Settings* const section = initial ? initial->find(what) : nullptr;
+    return section && section->find(parts_.context->about.states[static_cast<std::size_t>(state)].name);
+  };
+  const auto is_known = [&](int state) { return initial_state && std::isfinite((*initial_state)[state]); };
+  for (int j = 0; initial_state && j < initial_state->size(); ++j)
+    if (!is_stated("state", j) && is_known(j)) parts.initial_mean[j] = (*initial_state)[j];
+  // A heading that nobody has said anything of may be any, as one that is to be searched, and whatever else turns with
+  // the vehicle is as unknown.
+  const Roles& roles = parts_.context->about.roles;
+  const auto is_open = [&](int state) {
+    const bool is_said = is_stated("state", state) || is_stated("sigma", state) || is_known(state);
+    return !is_said || parts_.heading_starts > 1;
+  };
+  if (roles.heading >= 0 && is_open(roles.heading)) {
+    std::vector<int> turned{roles.heading};
+    std::ranges::copy_if(roles.other_headings, std::back_inserter(turned), is_open);
+    const double said = parts.initial_covariance(roles.heading, roles.heading);
+    const double unsaid = std::max(0.0, variance_of_any_angle - said);
+    for (const int a : turned)
+      for (const int b : turned) parts.initial_covariance(a, b) += unsaid;
+    if (parts_.heading_starts == 1) parts.heading_starts = starts_of_any_heading;
+  }
   require_start_within_bounds(parts);
   return parts;
 }
@@ -307,8 +344,10 @@ std::unique_ptr<Estimator> EstimatorSection::make(const std::optional<Eigen::Vec
   timeline.output_sigmas = parts_.context->noise.output_sigmas;
   const EstimatorMaker& maker = makers_.named(options_.name);
   require_memory_for(maker);
-  auto method = hooks.wrap_method(maker.make(with_hooks));
   auto watch = make_watch_for(maker, with_hooks);
+  // Who judges measurements searches the heading, too, and says so.
+  if (watch) with_hooks.heading_starts = 1;
+  auto method = hooks.wrap_method(maker.make(with_hooks));
   if (!watch) return std::make_unique<Estimator>(std::move(method), timeline);
   return std::make_unique<Estimator>(std::move(method), timeline, std::move(watch));
 }

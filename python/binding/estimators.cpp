@@ -49,7 +49,8 @@ std::shared_ptr<NamedEstimator> make_estimator(const std::shared_ptr<RobotObject
     const std::vector<Variable>& states = hooked.bounded_description().states;
     start = Eigen::Map<const Eigen::VectorXd>(vector_of(*initial_state, states, "initial_state"),
                                               static_cast<Eigen::Index>(states.size()));
-    if (!start->allFinite()) throw Error("initial_state: found a number that is not finite; expected finite ones");
+    if (start->array().isInf().any())
+      throw Error("initial_state: found an infinite number; expected finite ones, and NaN where it is not known");
   }
   made->estimator = hooked.make_estimator(start);
   made->about = described(hooked, *made->estimator);

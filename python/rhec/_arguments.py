@@ -328,7 +328,7 @@ MEANINGS = {
     "file": "the name of a file, a text",
     "folder": "the name of a folder, a text",
     "id": "a text",
-    "initial_state": "a number for each state, (n_x), in their units, or None",
+    "initial_state": "a number for each state, (n_x), in their units, NaN where it is not known, or None",
     "inputs": "a number for each input, (n_u), or rows of them, (n, n_u), in their units",
     "Controller.applied.inputs": "a number for each input, (n_u), in their units",
     "Estimator.push_input.inputs": "a number for each input, (n_u), in their units",

@@ -40,7 +40,10 @@ class Robot:
 
     @told_below
     def make_estimator(self, initial_state: ArrayLike | None = None) -> _rhec.Estimator:
-        """A new estimator; `initial_state` (n_x) is used where the configuration has none."""
+        """A new estimator; `initial_state` (n_x, NaN where it is not known) is used where the configuration has none.
+
+        A heading that neither of them tells may be any: it is searched as soon as the vehicle moves.
+        """
         return _rhec.Estimator(self._robot, initial_state)
 
     @told_below

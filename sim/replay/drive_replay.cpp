@@ -13,6 +13,7 @@
 #include "rhec/core/base/angle.hpp"
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/base/infinity.hpp"
+#include "rhec/core/estimation/measurement.hpp"
 #include "rhec/core/model/motion_outputs.hpp"
 
 namespace rhec::sim {
@@ -319,6 +320,7 @@ Eigen::VectorXd start_of(const Robot& robot, const logs::Drive& drive,
   const std::vector<double>& measured = first.values;
   Eigen::VectorXd start = Eigen::VectorXd::Zero(model.state_count());
   const std::vector<bool> of_state = outputs_of_state(model);
+  std::vector<bool> is_told(static_cast<std::size_t>(model.state_count()), false);
   // Angles first: what they turn, such as a lever arm, is then right for positions.
   for (const bool angles : {true, false}) {
     const Seen seen(model, start);
@@ -330,11 +332,17 @@ Eigen::VectorXd start_of(const Robot& robot, const logs::Drive& drive,
         if (std::isnan(measured[j]) || !of_state[j] || model.description().outputs[j].unit != state.unit) continue;
         if (std::abs(seen.slope(j, i) - 1.0) > 1e-9) continue;
         found[static_cast<Eigen::Index>(i)] += measured[j] - seen.outputs[j];
+        is_told[i] = true;
         break;
       }
     }
     start = found;
   }
+  const auto forget = [&](int heading) {
+    if (heading >= 0 && !is_told[static_cast<std::size_t>(heading)]) start[heading] = missing_value;
+  };
+  forget(model.description().roles.heading);
+  std::ranges::for_each(model.description().roles.other_headings, forget);
   return start;
 }
 

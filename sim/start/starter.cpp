@@ -181,6 +181,9 @@ std::string robot_text(const Host& host, const StarterWishes& wishes, const Mode
       values.push_back(fmt::format("{}: {}", parameter.name, short_number(parameter.nominal)));
     lines.add(fmt::format("    parameters: {{{}}}", fmt::join(values, ", ")),
               "before anything is known: nothing slips");
+    if (about.roles.heading >= 0)
+      lines.add(fmt::format("    # state: {{{}: 0}}", about.states[static_cast<std::size_t>(about.roles.heading)].name),
+                "where it heads [rad], if you know; else it is lost until a sensor or its motion tells");
   }
   lines.add("");
   lines.add("controller:");

@@ -51,7 +51,9 @@ class TunedDrive final : public TunedLog {
     sensors_ = replay.sensors;
     withheld_ = sensor_to_withhold(first, sensors_);
     unit_ = about.outputs[static_cast<std::size_t>(sensors_[static_cast<std::size_t>(withheld_)].outputs.front())].unit;
-    const bool is_searched = first.estimator_options().heading_starts > 1;
+    const int heading = about.roles.heading;
+    const bool is_searched = first.estimator_options().heading_starts > 1 ||
+                             (heading >= 0 && std::isnan(start_of(first, drive, start_)[heading]));
     list_entries(is_searched ? known_from(replay, about.roles) : -std::numeric_limits<double>::infinity());
   }
 

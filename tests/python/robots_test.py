@@ -1,5 +1,6 @@
 """Robots, estimators and controllers, sample by sample."""
 import copy
+import math
 import os
 import pickle
 import subprocess
@@ -346,8 +347,8 @@ def test_what_a_callback_raises_stays_as_it_is():
 
 def test_what_no_estimator_can_begin_with():
     robot = rhec.Robot(ROBOT)
-    with pytest.raises(rhec.Error, match="initial_state: found a number that is not finite"):
-        robot.make_estimator([0, numpy.nan, 0, 0])
+    with pytest.raises(rhec.Error, match="initial_state: found an infinite number"):
+        robot.make_estimator([0, numpy.inf, 0, 0])
     driven = Driven(robot)
     driven.step()
     for covariance in (-numpy.eye(6), numpy.arange(36.0).reshape(6, 6), numpy.full((6, 6), numpy.nan)):
@@ -362,6 +363,21 @@ def test_what_no_estimator_can_begin_with():
     for wrong in ({"acceleration": -1}, {"lateral_acceleration": 0}, {"acceleration": numpy.nan}):
         with pytest.raises(rhec.Error, match=f"{next(iter(wrong))}: expected more than 0"):
             rhec.Path([(0, 0, 1), (1, 0, 1)], **wrong)
+
+
+def test_of_a_heading_that_nobody_tells_nothing_is_known():
+    any_angle = math.pi / math.sqrt(3.0)
+    initial = {"state": {"psi": 0.3}, "sigma": {"psi": 0.2}}
+    for start, configured, sigma in ((None, {}, any_angle), ([1.0, 2.0, numpy.nan], {}, any_angle), ([1.0, 2.0, 0.5], {}, 0.1),
+                                     (None, {"initial": initial}, 0.2), ([1.0, 2.0, numpy.nan], {"initial": {"state": {"psi": 0.3}}}, 0.1)):
+        robot = rhec.Robot({"model": "skid_steer", "estimator": {"name": "ekf"} | configured})
+        estimator = robot.make_estimator(initial_state=start)
+        estimator.push_measurement(0.0, [1.0, 2.0, numpy.nan])
+        now = estimator.estimate(0.0)
+        assert now.covariance[2, 2]**0.5 == pytest.approx(sigma, rel=0.05), (start, configured)
+        assert str(now.health) == ("lost" if sigma == any_angle else "ok")
+        estimator.push_measurement(0.1, [1.0, 2.0, 0.5])
+        assert abs(estimator.estimate(0.1).state[2] - 0.5) < 0.3
 
 
 def test_robots_are_pickled_and_others_say_what_to_do(tmp_path, monkeypatch):

@@ -2,7 +2,11 @@
 
 #include <gmock/gmock.h>
 
+#include <cmath>
 #include <limits>
+#include <numbers>
+#include <optional>
+#include <string>
 
 #include "plugins/robot/robots.hpp"
 #include "support/error_of.hpp"
@@ -12,9 +16,12 @@ namespace estimator_section_test {
 
 using testing::AllOf;
 using testing::DoubleEq;
+using testing::DoubleNear;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::StartsWith;
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
 EstimatorSection estimator(const std::string& text, const std::string& bounds = {}) {
   const auto context = context_with(bounds);
@@ -38,7 +45,10 @@ TEST(EstimatorSection, HasTheDocumentedDefaults) {
   EXPECT_TRUE(parts.robust.empty());
   // States of 10, 10, 1 and 0.3, parameters of 0.5 as typical magnitudes.
   EXPECT_THAT(mean_of(parts), ElementsAre(0.0, 0.0, 0.0, 0.0, 0.5, 0.5));
-  EXPECT_THAT(sigma_of(parts),
+  const double any_angle = std::numbers::pi / std::sqrt(3.0);
+  EXPECT_THAT(sigma_of(parts), ElementsAre(DoubleEq(1.0), DoubleEq(1.0), DoubleNear(any_angle, 1e-12), DoubleEq(0.03),
+                                           DoubleEq(0.5), DoubleEq(0.5)));
+  EXPECT_THAT(sigma_of(section.parts(Eigen::VectorXd::Zero(4))),
               ElementsAre(DoubleEq(1.0), DoubleEq(1.0), DoubleEq(0.1), DoubleEq(0.03), DoubleEq(0.5), DoubleEq(0.5)));
   ASSERT_EQ(parts.walks.size(), 2U);
 
@@ -48,12 +58,14 @@ TEST(EstimatorSection, HasTheDocumentedDefaults) {
   EXPECT_EQ(shown("horizon"), std::to_string(parts.horizon));
   EXPECT_EQ(shown("substeps"), "auto");
   EXPECT_EQ(parts.substeps, 1);
-  EXPECT_EQ(shown("heading_starts"), std::to_string(parts.heading_starts));
+  EXPECT_EQ(shown("heading_starts"), std::to_string(section.parts(Eigen::VectorXd::Zero(4)).heading_starts));
+  EXPECT_GT(parts.heading_starts, 1) << "nothing tells where it heads";
   EXPECT_EQ(shown("arrival.name"), "ekf");
   EXPECT_EQ(shown("process_noise.PARAMETER"), NumberValue{}.print(parts.walks[1].process_noise));
   EXPECT_EQ(shown("restart_sigma.PARAMETER"), NumberValue{}.print(parts.walks[1].restart_sigma));
   EXPECT_EQ(shown("block_sigma.PARAMETER"), NumberValue{}.print(parts.walks[1].block_sigma));
-  EXPECT_EQ(shown("initial.sigma.STATE"), "0.1 x its typical magnitude");
+  EXPECT_EQ(shown("initial.sigma.STATE"),
+            "0.1 x its typical magnitude; of a heading that nothing tells: any is as probable");
   EXPECT_EQ(shown("initial.sigma.PARAMETER"), "1 x its typical magnitude");
   EXPECT_EQ(shown("solver.name"), section.solver_choice().name);
 }
@@ -94,7 +106,29 @@ TEST(EstimatorSection, TakesAnInitialStateWhereItHasNone) {
   EXPECT_THAT(mean_of(estimator("initial: {parameters: {mu: 0.25}}").parts(start)),
               ElementsAre(1.0, 2.0, 3.0, 4.0, 0.5, 0.25));
   EXPECT_THAT(mean_of(estimator("initial: {state: {y_pos: 9}}").parts(start)),
-              ElementsAre(0.0, 9.0, 0.0, 0.0, 0.5, 0.5));
+              ElementsAre(1.0, 9.0, 3.0, 4.0, 0.5, 0.5));
+  Eigen::VectorXd partial = start;
+  partial[1] = partial[2] = nan;
+  EXPECT_THAT(mean_of(estimator("initial: {state: {y_pos: 9}}").parts(partial)),
+              ElementsAre(1.0, 9.0, 0.0, 4.0, 0.5, 0.5));
+}
+
+/// What nobody has said of a heading is not known: neither the section, nor who makes the estimator.
+TEST(EstimatorSection, KnowsOfAHeadingWhatIsSaidOfIt) {
+  const double any_angle = std::numbers::pi / std::sqrt(3.0);
+  const auto sigma = [](const std::string& text, const std::optional<Eigen::VectorXd>& start = {}) {
+    return sigma_of(estimator(text).parts(start))[2];
+  };
+  Eigen::VectorXd start = Eigen::VectorXd::Zero(4);
+  EXPECT_DOUBLE_EQ(sigma("", start), 0.1);
+  EXPECT_DOUBLE_EQ(sigma("initial: {state: {beta: 1}}"), 0.1);
+  EXPECT_DOUBLE_EQ(sigma("initial: {sigma: {beta: 0.3}}"), 0.3);
+  EXPECT_NEAR(sigma("initial: {state: {x_pos: 1}}"), any_angle, 1e-12);
+  EXPECT_NEAR(sigma("heading_starts: 8", start), any_angle, 1e-12) << "it is to be searched";
+  EXPECT_DOUBLE_EQ(sigma("{heading_starts: 8, initial: {sigma: {beta: 3}}}"), 3.0);
+  start[2] = nan;
+  EXPECT_NEAR(sigma("", start), any_angle, 1e-12);
+  EXPECT_DOUBLE_EQ(sigma("initial: {state: {beta: 1}}", start), 0.1);
 }
 
 TEST(EstimatorSection, RefusesUnknownNamesWithTheNearest) {
@@ -148,7 +182,7 @@ TEST(EstimatorSection, MakesTheEstimatorOfItsNameOnItsTimeline) {
 }
 
 TEST(EstimatorSection, KnowsDelaysOfOutputs) {
-  const auto made = estimator("{name: ekf, delays: {x_gps: 0.1, y_gps: 0.1}}").make();
+  const auto made = estimator("{name: ekf, delays: {x_gps: 0.1, y_gps: 0.1}, initial: {sigma: {beta: 0.1}}}").make();
   const double outputs[] = {1.0, 2.0, 0.0};
   for (int k = 0; k <= 4; ++k) made->push_measurement(0.2 * k, outputs);
   EXPECT_DOUBLE_EQ(made->estimate(0.8).time, 0.8);

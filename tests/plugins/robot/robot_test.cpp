@@ -102,6 +102,16 @@ TEST(Robot, NotesTermsThatDoNothing) {
                                            HasSubstr("does nothing"))));
 }
 
+TEST(Robot, NotesCostsOfLimitsThatAreHard) {
+  const auto notes = [](const std::string& more) {
+    return robot("controller: {terms: [{name: corridor, left: 2, right: 2, " + more + "}]}").notes();
+  };
+  EXPECT_THAT(notes("hard: true, soft: {linear: 50}"),
+              ElementsAre(testing::AllOf(HasSubstr("soft"), HasSubstr("limits that are hard have no cost"))));
+  for (const char* const more : {"hard: true", "soft: {linear: 50}", "hard: false, soft: {linear: 50}"})
+    EXPECT_THAT(notes(more), testing::IsEmpty()) << more;
+}
+
 TEST(Robot, SaysThatASensorIsNotAmongTheUsualOnes) {
   for (const char* const model : {"", "model: bicycle_slip\n", "model: {name: bicycle_slip, wheelbase: 2}\n"})
     for (const char* const noise :

@@ -117,6 +117,7 @@ class RHEC_EXPORT Estimator {
   /// Whether measurements are used that are not judged yet.
   bool goes_ahead() const noexcept { return used_ > watched_ + timeline_.tolerance; }
   SensorWatch::Finding judge(double time, MeasuredOutputs& outputs, Clock::time_point deadline) noexcept;
+  SensorWatch::Finding start_late(double time, const MeasuredOutputs& outputs, Clock::time_point deadline) noexcept;
   int inputs_source() const noexcept { return static_cast<int>(presence_.size()); }
   double longest_silence(int source) const noexcept;
   void hold_missing_inputs(double time) noexcept;

@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "rhec/core/base/infinity.hpp"
 #include "rhec/core/estimation/estimate.hpp"
 #include "rhec/core/estimation/health.hpp"
 #include "rhec/core/estimation/sensor_watch_setup.hpp"
@@ -59,6 +60,8 @@ class RHEC_EXPORT SensorWatch {
   };
   /// Judges outputs (n_y, NaN where missing; weights as in Measured) of a time [s]; those not to be used become NaN.
   Finding judge(double time, double* outputs, const double* weights = nullptr) noexcept;
+  /// While there is nothing to judge by: whether a measurement, perhaps a late one, says where the vehicle begins.
+  Finding place_start(const double* outputs, const double* weights) noexcept;
   /// Whether a late measurement of a time passes; those outputs that do not become NaN.
   void judge_late(double time, double* outputs, const double* weights = nullptr) noexcept;
   /// Behind the last sample that was judged, and before late ones that may still change that: from there on, `advance`,
@@ -133,9 +136,11 @@ class RHEC_EXPORT SensorWatch {
   bool is_searching() const noexcept, is_expected(std::size_t s) const noexcept, is_heard(std::size_t s) const noexcept;
   int offset_in_dispute() noexcept;
   void start_search(const double* outputs) noexcept;
-  void search_from(WalkingFilter& filter, HeadingSearch& search) noexcept;
+  void search_from(WalkingFilter& filter, HeadingSearch& search, const double* outputs,
+                   double sigma = infinity) noexcept;
   void think_again() noexcept;
-  Finding search_heading(const double*outputs) noexcept, place_start(const double*outputs) noexcept;
+  Finding search_heading(const double* outputs) noexcept;
+  bool is_heading_open(const double* outputs) noexcept;
   void start(Hypothesis& hypothesis) noexcept;
   void start_moved() noexcept;
   bool fits(WalkingFilter& filter, const double* outputs) noexcept;

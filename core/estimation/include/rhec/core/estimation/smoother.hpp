@@ -48,7 +48,13 @@ class RHEC_EXPORT NodeRecorder final : public EstimationMethod {
   void rewind(int nodes) noexcept override;
   void estimate(Estimate& result, Clock::time_point deadline) noexcept override;
   void prepare() noexcept override { method_->prepare(); }
+  void rehearse() noexcept override { method_->rehearse(); }
   void reset() noexcept override;
+  /// What was measured before counts in the log as before.
+  bool rebase(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance) noexcept override {
+    return method_->rebase(mean, covariance);
+  }
+  void listen(std::shared_ptr<const FilterMemo> memo) override { method_->listen(std::move(memo)); }
   std::optional<OutputNoise> output_noise(int output) const noexcept override { return method_->output_noise(output); }
   void end_drive() noexcept override { method_->end_drive(); }
   std::shared_ptr<const SlipAhead> slip_ahead() const noexcept override { return method_->slip_ahead(); }

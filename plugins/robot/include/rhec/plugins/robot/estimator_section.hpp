@@ -54,7 +54,8 @@ class RHEC_EXPORT EstimatorSection {
   /// Replaces the makers.
   void use(EstimatorMakers makers) { makers_ = std::move(makers); }
 
-  /// `initial_state`, if given, replaces the default; the section's own initial state takes precedence.
+  /// `initial_state`, if given, replaces the defaults of the states that the section says nothing of; NaN where it says
+  /// nothing either.
   EstimatorParts parts(const std::optional<Eigen::VectorXd>& initial_state = {}) const;
   std::unique_ptr<Estimator> make(const std::optional<Eigen::VectorXd>& initial_state = {},
                                   const RobotHooks& hooks = {}) const;
@@ -67,8 +68,7 @@ class RHEC_EXPORT EstimatorSection {
   EstimatorMakers makers_;
   EstimatorOptions options_;
   EstimatorParts parts_;
-  std::vector<double> delays_;      ///< by output
-  bool has_initial_state_ = false;  ///< the section gives the initial state
+  std::vector<double> delays_;  ///< by output
 };
 
 }  // namespace rhec

@@ -99,7 +99,8 @@ class RHEC_EXPORT Robot {
   /// Applies to everything made from now on, outside of the hooks added before. Copies of the robot keep the hooks.
   void add_hooks(std::shared_ptr<const RobotHooks> hooks);
 
-  /// The estimator of the section `estimator`; `initial_state`, if given, is used if that section has none.
+  /// The estimator of the section `estimator`. `initial_state`, if given, is used of the states that the section says
+  /// nothing of (NaN: not known either). A heading that nobody has said anything of may be any, and is searched.
   std::unique_ptr<Estimator> make_estimator(const std::optional<Eigen::VectorXd>& initial_state = {}) const;
   /// `ahead`: Estimator::slip_ahead, for a controller that plans with the slip of a map.
   std::unique_ptr<Controller> make_controller(const Path& path, std::shared_ptr<const SlipAhead> ahead = nullptr) const;

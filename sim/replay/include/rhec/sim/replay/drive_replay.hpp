@@ -71,7 +71,8 @@ RHEC_EXPORT DriveReplay replay_drive(const Robot& robot, const logs::Drive& driv
                                      const std::optional<Eigen::VectorXd>& simulated_start = {},
                                      const LoopHooks& hooks = {});
 
-/// The state that the first measurement of each output tells of directly: a position, a heading, an angle; all else 0.
+/// The state that the first measurement of each output tells of directly: a position, a heading, an angle; NaN of a
+/// heading that none tells of, all else 0.
 RHEC_EXPORT Eigen::VectorXd start_of(const Robot& robot, const logs::Drive& drive,
                                      const std::optional<Eigen::VectorXd>& simulated_start = {});
 
