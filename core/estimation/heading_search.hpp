@@ -13,8 +13,8 @@ namespace rhec {
 /// Takes motion.
 ///
 /// Where an antenna is says where the vehicle is only together with its heading: each filter has a place of its own, by
-/// the first position. What none of them explains is not used. Evidence fades: a vehicle that stands for hours would
-/// else collect as much of it from noise as one that moves does in a second.
+/// the first position. What none of them explains is not used if what came before went together. Evidence fades: a
+/// vehicle that stands for hours would else collect as much of it from noise as one that moves does in a second.
 class HeadingSearch {
  public:
   static constexpr int starts = 16;
