@@ -51,12 +51,12 @@ bool HeadingSearch::sees_position(const WalkingFilter& filter, Measured outputs)
   return is_seen(roles.position_x) && is_seen(roles.position_y);
 }
 
-/// Forgets where the vehicle is, and takes it from a measured position. How far that is from where it was [m].
-double HeadingSearch::place(WalkingFilter& filter, Measured outputs) noexcept {
+/// Forgets where the vehicle is, and takes it from a measured position.
+void HeadingSearch::place(WalkingFilter& filter, Measured outputs) noexcept {
   const Roles& roles = filter.model().description().roles;
-  if (!outputs) return 0.0;
+  if (!outputs) return;
   filter.expect();
-  if (!sees_position(filter, outputs)) return 0.0;
+  if (!sees_position(filter, outputs)) return;
   for (int j = 0; j < static_cast<int>(position_.size()); ++j) {
     const bool is_position = filter.depends_on(j, roles.position_x) || filter.depends_on(j, roles.position_y);
     position_[static_cast<std::size_t>(j)] = is_position ? outputs[j] : std::numeric_limits<double>::quiet_NaN();
@@ -68,7 +68,10 @@ double HeadingSearch::place(WalkingFilter& filter, Measured outputs) noexcept {
     filter.covariance()(i, i) = unknown_place * unknown_place;
   }
   filter.update({position_.data(), outputs.weights});
-  return std::hypot(filter.mean()[roles.position_x] - x, filter.mean()[roles.position_y] - y);
+  // One that is far from where the vehicle was thought to be may be wrong itself.
+  const double away = std::hypot(filter.mean()[roles.position_x] - x, filter.mean()[roles.position_y] - y);
+  const double doubt = std::min(0.5 * away, unknown_place);
+  for (const int i : {roles.position_x, roles.position_y}) filter.covariance()(i, i) += doubt * doubt;
 }
 
 void HeadingSearch::start(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance, Measured outputs,
@@ -78,8 +81,6 @@ void HeadingSearch::start(const Eigen::VectorXd& mean, const Eigen::MatrixXd& co
   is_active_ = true;
   best_ = 0;
   unplaced_ = explained_places_ = 0;
-  // A position that is far from where the vehicle was thought to be, as it heads there, may be wrong itself.
-  double doubt = 0.0;
   for (std::size_t i = 0; i < headings_.size(); ++i) {
     WalkingFilter& filter = headings_[i].filter;
     const double turn = angle_difference(part * static_cast<double>(i), 0.0) / sigma;
@@ -96,10 +97,7 @@ void HeadingSearch::start(const Eigen::VectorXd& mean, const Eigen::MatrixXd& co
     for (const int body : roles.other_headings)
       if (filter.covariance()(body, body) > unknown)
         filter.covariance()(body, body) = std::max(filter.covariance()(body, body) - unknown, 0.0) + known;
-    const double away = place(filter, outputs);
-    if (i == 0) doubt = std::min(0.5 * away, unknown_place);
-    for (const int j : {roles.position_x, roles.position_y})
-      if (j >= 0) filter.covariance()(j, j) += doubt * doubt;
+    place(filter, outputs);
   }
 }
 

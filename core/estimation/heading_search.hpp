@@ -48,7 +48,7 @@ class HeadingSearch {
     double log_probability() const noexcept { return prior + log_likelihood; }
     int explained = 0;  ///< samples in a row
   };
-  double place(WalkingFilter& filter, Measured outputs) noexcept;
+  void place(WalkingFilter& filter, Measured outputs) noexcept;
   bool weigh(const Sensor& sensor, Measured outputs) noexcept;
   bool is_settled() const noexcept;
   void restart(Measured outputs) noexcept;
