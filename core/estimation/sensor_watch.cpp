@@ -240,7 +240,7 @@ void SensorWatch::restart(const Eigen::VectorXd& mean, const Eigen::MatrixXd& co
   own_->filter.mean() = mean;
   own_->filter.covariance() = covariance;
   is_active_ = true;
-  is_blind_ = false;
+  is_blind_ = memory_->is_starting = false;
   if (memory_->search) memory_->search->cancel();
   end_dispute();
   memory_->places.clear();
