@@ -1,9 +1,10 @@
-// Takes a number of steps over a recorded drive, for callgrind to count their instructions, in `counted_step` only.
+// Takes a number of steps over a drive, for callgrind to count their instructions, in `counted_step` only. The drive is
+// recorded into a file before, as it takes a hundred times as long where callgrind looks on.
 // scripts/measure/instructions runs it.
-#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
+#include <fstream>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,8 @@
 #endif
 
 #include "rhec/core/base/error.hpp"
+#include "rhec/sim/files/csv.hpp"
+#include "rhec/sim/problems/problem_file.hpp"
 #include "rti_loop.hpp"
 
 namespace {
@@ -28,43 +31,63 @@ void counted_step(rhec::bench::RtiLoop& loop) { loop.step(); }
 namespace rhec::bench {
 namespace {
 
-/// `assignments` are those of another drive, as after --set. Steps: none are those of the whole drive.
-void count(const std::string& name, int steps, const std::vector<std::string>& assignments) {
+/// Writes the problems of a sequence, one a line. `assignments` are those of another drive, as after --set.
+void record_sequence(const std::string& name, const std::string& file, const std::vector<std::string>& assignments) {
   const Host host;
   for (Drive how : usual_drives()) {
     if (!name.starts_with(how.name + "/")) continue;
     how.assignments.insert(how.assignments.end(), assignments.begin(), assignments.end());
-    for (const Sequence& sequence : drive(host, how)) {
-      if (sequence.name != name) continue;
-      RtiLoop loop(sequence, host.make_solver("gn_rti"));
-      if (steps == 0) steps = static_cast<int>(sequence.samples.size()) - uncounted_steps;
-      if (steps < 1 || uncounted_steps + steps > static_cast<int>(sequence.samples.size()))
-        throw Error("the sequence '" + name + "' has " + std::to_string(sequence.samples.size()) +
-                    " samples, of which " + std::to_string(uncounted_steps) + " are not counted");
-      // With --instr-atstart=no the drive until here takes less time.
-      CALLGRIND_START_INSTRUMENTATION;
-      loop.restart();
-      for (int k = 0; k < uncounted_steps; ++k) loop.step();
-      for (int k = 0; k < steps; ++k) counted_step(loop);
-      std::printf("%d steps; %s, %s\n", steps, RHEC_COMPILER, sequence.model->instruction_sets().back().c_str());
+    for (const std::vector<sim::ProblemRecord>& records : record(host, how)) {
+      if (how.name + "/" + records.front().kind != name) continue;
+      std::ofstream stream(file);
+      for (const sim::ProblemRecord& record : records) stream << sim::problem_line(record) << '\n';
+      if (!stream.flush()) throw Error(file + ": cannot be written");
       return;
     }
   }
   throw Error("there is no sequence '" + name + "'");
 }
 
+/// Steps: none are those of the whole drive.
+void count(const std::string& file, int steps) {
+  std::vector<sim::ProblemRecord> records = sim::read_problems(sim::read_text(file), file);
+  if (records.empty()) throw Error(file + ": has no problem");
+  const int count = static_cast<int>(records.size());
+  if (steps == 0) steps = count - uncounted_steps;
+  if (steps < 1 || uncounted_steps + steps > count)
+    throw Error(file + ": has " + std::to_string(count) + " problems, of which " + std::to_string(uncounted_steps) +
+                " are not counted");
+  records.resize(static_cast<std::size_t>(uncounted_steps + steps));
+  const Host host;
+  sim::make_terms(records, host);
+  const Sequence sequence = sequence_of(records, host.make_model(records.front().model, records.front().model_options));
+  RtiLoop loop(sequence, host.make_solver("gn_rti"));
+  // With --instr-atstart=no what comes before takes less time.
+  CALLGRIND_START_INSTRUMENTATION;
+  loop.restart();
+  for (int k = 0; k < uncounted_steps; ++k) loop.step();
+  for (int k = 0; k < steps; ++k) counted_step(loop);
+  std::printf("%d steps; %s, %s\n", steps, RHEC_COMPILER, sequence.model->instruction_sets().back().c_str());
+}
+
 }  // namespace
 }  // namespace rhec::bench
 
 int main(int argument_count, char** words) try {
-  if (argument_count < 2) {
+  const std::vector<std::string> given(words + 1, words + argument_count);
+  if (given.size() > 2 && given[0] == "record") {
+    rhec::bench::record_sequence(given[1], given[2], {given.begin() + 3, given.end()});
+  } else if (given.size() == 2 && given[0] == "count") {
+    rhec::bench::count(given[1], counted_steps);
+  } else if (given.size() == 3 && given[0] == "count") {
+    rhec::bench::count(given[1], std::atoi(given[2].c_str()));
+  } else {
     std::fprintf(stderr,
-                 "usage: count_instructions SEQUENCE [STEPS [KEY=VALUE ...]], such as figure8/fhb/rhe 100, or "
-                 "obstacles/limits/rhc 0 seed=2 (0 steps: all)\n");
+                 "usage: count_instructions record SEQUENCE FILE [KEY=VALUE ...], such as obstacles/limits/rhc "
+                 "drive.jsonl seed=2\n"
+                 "       count_instructions count FILE [STEPS], such as drive.jsonl 100 (0 steps: all)\n");
     return 2;
   }
-  rhec::bench::count(words[1], argument_count > 2 ? std::atoi(words[2]) : counted_steps,
-                     {words + std::min(argument_count, 3), words + argument_count});
   return 0;
 } catch (const std::exception& mistake) {
   std::fprintf(stderr, "%s\n", mistake.what());

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "missing_inputs.hpp"
 #include "rhec/core/base/with_size.hpp"
 #include "rhec/core/estimation/measurement.hpp"
 #include "rhec/core/qp/small_matrix.hpp"
@@ -53,7 +54,7 @@ void triangularise(Eigen::MatrixXd& rows, Eigen::Index m) noexcept {
 }  // namespace
 
 ArrivalCost::ArrivalCost(ArrivalKind kind, const RheProblem& like, std::vector<ParameterWalk> walks)
-    : kind_(kind), walks_(std::move(walks)), filter_(make_filter(like)) {
+    : kind_(kind), walks_(std::move(walks)), filter_(make_filter(like)), ahead_(filter_), factors_(like.model()) {
   const Model& model = like.model();
   const int nx = model.state_count(), nu = model.input_count(), np = model.parameter_count(), ny = model.output_count();
   initial_covariance_ = filter_.covariance;
@@ -150,8 +151,18 @@ void ArrivalCost::invert_factor() noexcept {
 void ArrivalCost::slide(const RheProblem& problem, const Iterate& solution, const std::vector<Border>& borders,
                         bool mean_is_lost) noexcept {
   const int nx = problem.model().state_count(), np = problem.model().parameter_count();
-  for (int j = 0; j < np; ++j) ramp_variances_[j] = borders[j].leaves_as_ramp ? borders[j].ramp_variance : 0.0;
-  switch (kind_ == ArrivalKind::ekf && mean_is_lost ? ArrivalKind::smoothing : kind_) {
+  const bool is_guessed = lacks_inputs(problem, 0);
+  factors_.begin(problem.measured_input(0));
+  if (!is_guessed) filter_.inputs().begin(problem.measured_input(0), problem.duration(0), filter_.covariance);
+  // Slip that begins anew, and an input that nobody knows, are a product of which nothing else is known.
+  const auto is_known = [&](int j) {
+    return !is_guessed || (!factors_.is_held(j) && borders[j].neighbour_sigma.has_value());
+  };
+  for (int j = 0; j < np; ++j)
+    ramp_variances_[j] = borders[j].leaves_as_ramp && is_known(j) ? borders[j].ramp_variance : 0.0;
+  ArrivalKind kind = kind_ == ArrivalKind::ekf && mean_is_lost ? ArrivalKind::smoothing : kind_;
+  if (kind == ArrivalKind::smoothing && is_guessed) kind = ArrivalKind::ekf;
+  switch (kind) {
     case ArrivalKind::ekf:
       filter_first_interval(problem, solution);
       break;
@@ -177,7 +188,7 @@ void ArrivalCost::slide(const RheProblem& problem, const Iterate& solution, cons
       continue;
     }
     filter_.add_parameter_variance(j, walks_[j].process_noise * walks_[j].process_noise);
-    if (!border.reached) continue;
+    if (!border.reached || !is_known(j)) continue;
     if (border.neighbour_sigma) {
       filter_.add_parameter_variance(j, *border.neighbour_sigma * *border.neighbour_sigma * border.steps);
     } else {
@@ -210,8 +221,37 @@ void ArrivalCost::filter_first_interval(const RheProblem& problem, const Iterate
     for (int k = 0; k < between.count(); ++k)
       for (int j = 0; j < between.width(); ++j) *weight++ = between.measured(k).weight(j);
   }
-  filter_.predict(between.over(problem.duration(0), problem.measured_input(0)), inputs_.data(),
-                  ramp ? ramp_variances_.data() : nullptr, between_weights_.data(), problem.measured(1));
+  filter_.predict(between.over(problem.duration(0), problem.measured_input(0)),
+                  lacks_inputs(problem, 0) ? nullptr : inputs_.data(), ramp ? ramp_variances_.data() : nullptr,
+                  between_weights_.data(), problem.measured(1));
+}
+
+const KalmanFilter& ArrivalCost::begin_filtering(const RheProblem& problem) noexcept {
+  ahead_ = filter_;
+  ahead_.update(problem.measured(0));
+  return ahead_;
+}
+
+const KalmanFilter& ArrivalCost::filter_interval(const RheProblem& problem, int interval) noexcept {
+  // Blocks begin as the problem has it, but as in `slide`.
+  factors_.begin(problem.measured_input(interval));
+  for (int j = 0; j < problem.model().parameter_count(); ++j) {
+    if (interval == 0 || factors_.is_held(j) || !problem.structure().starts_block(interval, j)) continue;
+    const double variance = problem.link_variance(interval, j);
+    if (std::isfinite(variance)) ahead_.add_parameter_variance(j, variance);
+  }
+  ahead_.predict(problem.between(interval).over(problem.duration(interval), problem.measured_input(interval)), nullptr,
+                 nullptr, nullptr, problem.measured(interval + 1));
+  for (int j = 0; j < problem.model().parameter_count(); ++j) {
+    const ParameterWalk& walk = walks_[static_cast<std::size_t>(j)];
+    if (walk.noise_sigma > 0.0) {
+      ahead_.expect_zero(j, walk.noise_sigma * walk.noise_sigma);
+    } else {
+      ahead_.add_parameter_variance(j, walk.process_noise * walk.process_noise);
+    }
+  }
+  ahead_.update(problem.measured(interval + 1));
+  return ahead_;
 }
 
 /// Rows in [dx; du; dp; dramp] about the solution: prior, outputs, measured inputs, ramp. Their QR factor R gives the

@@ -294,6 +294,7 @@ void Estimator::push_input(double time, const double* inputs) noexcept {
   }
   if (!std::isfinite(time)) return;
   if (watch_) hold_missing_inputs(time);
+  if (watch_) grid_.hold_inputs(longest_silence(inputs_source()));
   grid_.push_input(time, values_.data());
 }
 
@@ -447,7 +448,8 @@ void Estimator::rebase(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covar
 SensorWatch::Finding Estimator::judge(double time, MeasuredOutputs& outputs, Clock::time_point deadline) noexcept {
   const double last = watched_;
   watched_ = time;
-  const bool is_unknown = time - clocks_->newest(inputs_source()) > longest_silence(inputs_source());
+  const double longest = longest_silence(inputs_source());
+  const bool is_unknown = time - last > longest && time - clocks_->newest(inputs_source()) > longest;
   if (has_started())
     through_motion(last, time, deadline, [&](double begin, double end) {
       if (is_unknown) {
@@ -496,14 +498,12 @@ void Estimator::through_motion(double from, double to, Clock::time_point deadlin
   }
 }
 
-/// The mean input over a part of a motion that began at a time, 0 where none is known, and how much it may be off
-/// besides its noise. An input holds; the longer nobody has said so again, the less it is known: within a second it may
-/// change by its typical magnitude, and stay there.
+/// The mean input over a part of a motion that began at a time, and how much it may be off besides its noise. An input
+/// holds; the longer nobody has said so again, the less it is known: within a second it may change by its typical
+/// magnitude, and stay there. One that is silent stays missing.
 void Estimator::guess_input(double since, double begin, double end) noexcept {
   const std::vector<Variable>& inputs = model().description().inputs;
   std::copy_n(grid_.mean_input(begin, end), input_.size(), input_.begin());
-  for (std::size_t j = 0; j < measured_inputs_; ++j)
-    if (std::isnan(input_[j])) input_[j] = 0.0;
   const double newest_input = clocks_->newest(inputs_source()), usual = clocks_->usual_interval(inputs_source());
   const auto age_at = [&](double time) {
     return std::isnan(newest_input) ? time - since : std::max(0.0, time - newest_input - usual);
@@ -512,6 +512,10 @@ void Estimator::guess_input(double since, double begin, double end) noexcept {
   const double duration = end - begin, before = begin > since ? age_at(begin) / duration : 0.0,
                aged = age_at(end) / duration;
   for (std::size_t j = 0; j < measured_inputs_; ++j) {
+    if (std::isnan(input_[j])) {
+      input_sigmas_[j] = 0.0;
+      continue;
+    }
     const double sigma = inputs[j].scale * std::min(1.0, age_at(end));
     input_sigmas_[j] = sigma * std::sqrt(std::max(0.0, aged * aged - before * before));
   }
@@ -568,12 +572,14 @@ void Estimator::clip(Estimate& estimate) const noexcept {
 void Estimator::predict_to(double time, Clock::time_point deadline) noexcept {
   predicted_.predicted = true;
   const double last = grid_.time();
-  if (watch_ && watch_->is_active())
+  if (watch_ && watch_->is_active()) {
+    watch_->begin_predicting();
     return through_motion(last, time, deadline, [&](double begin, double end) {
       guess_input(last, begin, end);
       watch_->predict(end - begin, input_.data(), input_sigmas_.data(), predicted_);
       clip(predicted_);
     });
+  }
   through_motion(last, time, deadline, [&](double begin, double end) {
     std::copy_n(grid_.mean_input(begin, end), input_.size(), input_.begin());
     for (double& u : input_)

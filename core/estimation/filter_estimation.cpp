@@ -32,10 +32,10 @@ FilterEstimation::FilterEstimation(const std::shared_ptr<const Model>& model, Se
   for (int i = 0; i < count; ++i)
     bank_.push_back({KalmanFilter(model, setup_.noise, setup_.substeps, setup_.most_between), 0.0});
   if (setup_.remembered_nodes < 0) throw Error("filter: expected 0 remembered nodes or more");
-  const Moments moments{Eigen::VectorXd::Zero(n), Eigen::MatrixXd::Zero(n, n), 0.0};
+  const Moments moments{Eigen::VectorXd::Zero(n), Eigen::MatrixXd::Zero(n, n),
+                        std::vector<double>(bank_[0].filter.inputs().state_size(), 0.0), 0.0};
   nodes_.assign(setup_.remembered_nodes + std::size_t{1}, Node{std::vector<Moments>(bank_.size(), moments), 1, 0});
   for (const double sigma : setup_.walk) ramp_variances_.push_back(sigma * sigma);
-  no_input_.assign(model->input_count(), 0.0);
   predicted_.assign(model->output_count(), 0.0);
   jacobian_.assign(static_cast<std::size_t>(model->output_count()) * model->state_count(), 0.0);
   reset();
@@ -57,6 +57,7 @@ void FilterEstimation::reset() noexcept {
     bank_[i].log_likelihood = 0.0;
     filter.mean = setup_.initial_mean;
     filter.covariance = setup_.initial_covariance;
+    filter.inputs().forget();
     if (bank_.size() == 1) continue;
     // Each start covers its part of the circle.
     const Roles& roles = model().description().roles;
@@ -108,7 +109,8 @@ void FilterEstimation::take(Measured outputs) noexcept {
   for (std::size_t i = 0; i < alive_; ++i) {
     if (alive_ > 1) bank_[i].log_likelihood += log_likelihood(bank_[i].filter, outputs);
     const std::span given(outputs.values, setup_.noise.output_variances.size());
-    const bool is_known = memo_ && !outputs.weights && memo_->update.take(given, 0.0, bank_[i].filter);
+    const bool is_known = memo_ && !outputs.weights && !bank_[i].filter.inputs().is_any_missing() &&
+                          memo_->update.take(given, 0.0, bank_[i].filter);
     if (!is_known) bank_[i].filter.update(outputs);
   }
   if (alive_ == 1) return;
@@ -143,8 +145,11 @@ void FilterEstimation::add(const MeasuredInterval& interval, Measured outputs) n
     KalmanFilter& filter = bank_[i].filter;
     const std::span given(interval.inputs, setup_.noise.input_variances.size());
     const bool is_plain = interval.between == 0 && !interval.ends_with_jump;
-    if (memo_ && is_plain && memo_->prediction.take(given, interval.duration, filter)) continue;
-    filter.predict(interval, no_input_.data(), setup_.has_ramps ? ramp_variances_.data() : nullptr, nullptr, outputs);
+    if (memo_ && is_plain && memo_->prediction.take(given, interval.duration, filter)) {
+      filter.inputs().begin(interval.inputs, interval.duration, filter.covariance);
+      continue;
+    }
+    filter.predict(interval, nullptr, setup_.has_ramps ? ramp_variances_.data() : nullptr, nullptr, outputs);
     bank_[i].log_likelihood += filter.between_log_likelihood();
     for (std::size_t j = 0; !setup_.has_ramps && j < setup_.walk.size(); ++j)
       filter.add_parameter_variance(static_cast<int>(j), setup_.walk[j] * setup_.walk[j]);
@@ -164,6 +169,7 @@ void FilterEstimation::remember() noexcept {
   for (std::size_t i = 0; i < alive_; ++i) {
     kept.moments[i].mean = bank_[i].filter.mean;
     kept.moments[i].covariance = bank_[i].filter.covariance;
+    bank_[i].filter.inputs().save(kept.moments[i].inputs.data());
     kept.moments[i].log_likelihood = bank_[i].log_likelihood;
   }
   remembered_ = std::min(remembered_ + 1, static_cast<std::int64_t>(nodes_.size()));
@@ -183,6 +189,7 @@ void FilterEstimation::rewind(int nodes) noexcept {
   for (std::size_t i = 0; i < alive_; ++i) {
     bank_[i].filter.mean = kept.moments[i].mean;
     bank_[i].filter.covariance = kept.moments[i].covariance;
+    bank_[i].filter.inputs().restore(kept.moments[i].inputs.data());
     bank_[i].log_likelihood = kept.moments[i].log_likelihood;
   }
 }

@@ -38,7 +38,9 @@ KalmanFilter::KalmanFilter(std::shared_ptr<const Model> model, Noise noise, int 
       nx_(model_->state_count()),
       nu_(model_->input_count()),
       np_(model_->parameter_count()),
-      ny_(model_->output_count()) {
+      ny_(model_->output_count()),
+      input_guess_(model_->description().inputs, Eigen::Index{nx_} + np_),
+      input_factors_(*model_) {
   refuse_outputs_of_motion(*model_, "filter");
   const int n = nx_ + np_;
   mean = Eigen::VectorXd::Zero(n);
@@ -48,6 +50,8 @@ KalmanFilter::KalmanFilter(std::shared_ptr<const Model> model, Noise noise, int 
   next_.assign(nx_, 0.0);
   jacobian_.assign(static_cast<std::size_t>(nx_) * (nx_ + nu_ + 2 * np_), 0.0);
   input_.assign(nu_, 0.0);
+  input_variances_ = input_;
+  guessed_ = Eigen::MatrixXd::Zero(n, nu_);
   for (auto* v : {&added_, &innovations_, &innovation_variances_}) v->assign(ny_, 0.0);
   gains_ = Eigen::MatrixXd::Zero(n, ny_);
   carried_.assign(static_cast<std::size_t>(nx_) * carried_at_once, 0.0);
@@ -122,6 +126,7 @@ void KalmanFilter::update_as_expected(Measured y) noexcept {
   }
   take_outputs(y);
   mean += correction_;
+  if (guesses_inputs_) input_guess_.updated(mean, covariance);
   clip();
 }
 
@@ -233,9 +238,61 @@ void KalmanFilter::make_symmetric() noexcept {
   });
 }
 
-double KalmanFilter::input_variance(int input, const double* measured) const noexcept {
-  const double wide = unknown_sigma(model_->description().inputs[input]);
-  return std::isnan(measured[input]) ? wide * wide : noise_.input_variances[input];
+/// Moments of the inputs of an interval.
+void KalmanFilter::begin_inputs(const double* measured, const double* guess, double duration) noexcept {
+  if (!guess) input_guess_.begin(measured, duration, covariance);
+  guesses_inputs_ = !guess && input_guess_.is_any_missing();
+  if (guesses_inputs_) input_factors_.begin(measured);
+  for (int p = 0; guesses_inputs_ && p < np_; ++p)
+    if (input_factors_.is_held(p)) restart_parameter(p, covariance(nx_ + p, nx_ + p));
+  for (int j = 0; j < nu_; ++j) {
+    is_missing_[j] = std::isnan(measured[j]);
+    input_[j] = measured[j];
+    input_variances_[j] = noise_.input_variances[j];
+    if (!is_missing_[j]) continue;
+    const double wide = guess ? unknown_sigma(model_->description().inputs[j]) : 0.0;
+    input_[j] = guess ? guess[j] : input_guess_.mean(j);
+    input_variances_[j] = wide * wide;
+  }
+}
+
+/// Leaves out what parameters do that are held, in the Jacobians of several steps.
+void KalmanFilter::hold_factors(double* jacobians, int count) const noexcept {
+  const std::ptrdiff_t columns = nx_ + nu_ + 2 * np_;
+  for (int p = 0; guesses_inputs_ && p < np_; ++p) {
+    if (!input_factors_.is_held(p)) continue;
+    for (int k = 0; k < count; ++k)
+      for (const int column : {nx_ + nu_ + p, nx_ + nu_ + np_ + p})
+        std::fill_n(jacobians + (k * columns + column) * nx_, nx_, 0.0);
+  }
+}
+
+/// Adds what inputs that are guessed have in the next covariance, by the transition (n_x x n) of the state: with its
+/// derivatives B by the inputs, F C B' + B C' F' + B V B'. Their covariance with the next state is F C + B V.
+void KalmanFilter::add_guessed_inputs(const double* transition) noexcept {
+  const int n = nx_ + np_;
+  const Eigen::MatrixXd &V = input_guess_.covariance(), &C = input_guess_.with_state();
+  const auto B = [&](int r, int j) { return jacobian_[(nx_ + j) * nx_ + r]; };
+  for (int j = 0; j < nu_; ++j) {
+    for (int r = 0; r < n; ++r) {
+      guessed_(r, j) = r < nx_ ? 0.0 : C(r, j);
+      for (int k = 0; r < nx_ && k < n; ++k) guessed_(r, j) += transition[k * nx_ + r] * C(k, j);
+    }
+  }
+  for (int j = 0; j < nu_; ++j) {
+    if (!is_missing_[j]) continue;
+    for (int c = 0; c < nx_; ++c) {
+      for (int r = 0; r < n; ++r) {
+        next_covariance_(r, c) += guessed_(r, j) * B(c, j);
+        next_covariance_(c, r) += guessed_(r, j) * B(c, j);
+      }
+      for (int r = 0; r < nx_; ++r)
+        for (int k = 0; k < nu_; ++k) next_covariance_(r, c) += B(r, j) * V(j, k) * B(c, k);
+    }
+  }
+  for (int j = 0; j < nu_; ++j)
+    for (int r = 0; r < nx_; ++r)
+      for (int k = 0; k < nu_; ++k) guessed_(r, j) += B(r, k) * V(k, j);
 }
 
 void KalmanFilter::predict(const double* measured_input, const double* input_guess, double duration) noexcept {
@@ -245,7 +302,7 @@ void KalmanFilter::predict(const double* measured_input, const double* input_gue
 void KalmanFilter::predict(const double* measured_input, const double* input_guess, double duration,
                            const double* ramp_variances) noexcept {
   const int n = nx_ + np_;
-  for (int j = 0; j < nu_; ++j) input_[j] = std::isnan(measured_input[j]) ? input_guess[j] : measured_input[j];
+  begin_inputs(measured_input, input_guess, duration);
   if (ramp_variances) {
     Model::Intervals request;
     request.count = 1;
@@ -260,6 +317,7 @@ void KalmanFilter::predict(const double* measured_input, const double* input_gue
   } else {
     differentiate(duration);
   }
+  hold_factors(jacobian_.data(), 1);
   // Only the vehicle's rows of the transition [F_x F_p; 0 I] need a product.
   if (ramp_variances)
     for (int c = 0; c < np_; ++c)
@@ -288,8 +346,9 @@ void KalmanFilter::predict(const double* measured_input, const double* input_gue
       for (int r = 0; r < nx; ++r) next[c * n + r] = next[r * n + c] = work[c * n + r];
   });
   // Noise enters through the inputs and, on a ramp, through the change of the parameter over the interval.
+  if (guesses_inputs_) add_guessed_inputs(jacobian_rows_.data());
   for (int j = 0; j < nu_; ++j) {
-    const double variance = input_variance(j, measured_input);
+    const double variance = input_variances_[j];
     const double* by_input = jacobian_.data() + (nx_ + j) * nx_;
     for (int c = 0; c < nx_; ++c)
       for (int r = 0; r < nx_; ++r) next_covariance_(r, c) += by_input[r] * (variance * by_input[c]);
@@ -307,6 +366,11 @@ void KalmanFilter::predict(const double* measured_input, const double* input_gue
   if (!are_finite(next_) || !are_finite(next_covariance_)) return;
   make_symmetric();
   std::copy(next_.begin(), next_.end(), mean.data());
+  if (!guesses_inputs_) return;
+  for (int j = 0; j < nu_; ++j)
+    for (int r = 0; r < nx_ + np_; ++r)
+      if (is_missing_[j]) input_guess_.set_with_state(r, j, guessed_(r, j));
+  input_guess_.predicted(mean, covariance);
 }
 
 void KalmanFilter::carry(Deviations& deviations) noexcept {

@@ -23,7 +23,8 @@ void KalmanFilter::predict(const MeasuredInterval& interval, const double* input
   } else {
     if (interval.between == 0) return predict(interval.inputs, input_guess, interval.duration, ramp_variances);
     RHEC_ASSERT(wide_mean_.size() > 0, "a filter that was set up for measurements between nodes");
-    widen(interval.inputs, input_guess, ramp_variances);
+    begin_inputs(interval.inputs, input_guess, interval.duration);
+    widen(ramp_variances);
     const auto linearise = [&](double seconds) {
       point_ = wide_mean_;
       linearise_times(interval, 1, &seconds);
@@ -44,7 +45,8 @@ MeasuredInterval KalmanFilter::look_ahead(const MeasuredInterval& measured, cons
                                           Measured end_outputs) noexcept {
   RHEC_ASSERT(wide_mean_.size() > 0, "a filter that was set up for outputs of motion");
   is_curved_ = !curved_.empty();
-  widen(measured.inputs, input_guess, ramp_variances);
+  begin_inputs(measured.inputs, input_guess, measured.duration);
+  widen(ramp_variances);
   const MeasuredInterval interval = information_weights ? measured : summary_(measured);
   const double* const weights = information_weights ? information_weights : summary_.weights();
   std::copy_n(interval.times, interval.between, times_.begin());
@@ -80,8 +82,7 @@ MeasuredInterval KalmanFilter::look_ahead(const MeasuredInterval& measured, cons
 }
 
 /// From [x; p].
-void KalmanFilter::widen(const double* measured_input, const double* input_guess,
-                         const double* ramp_variances) noexcept {
+void KalmanFilter::widen(const double* ramp_variances) noexcept {
   const int n = nx_ + np_;
   wide_covariance_.setZero();
   for (int c = 0; c < n; ++c) {
@@ -89,9 +90,12 @@ void KalmanFilter::widen(const double* measured_input, const double* input_guess
     for (int r = 0; r < n; ++r) wide_covariance_(r, c) = covariance(r, c);
   }
   for (int j = 0; j < nu_; ++j) {
-    is_missing_[j] = std::isnan(measured_input[j]);
-    wide_mean_[n + j] = is_missing_[j] ? input_guess[j] : measured_input[j];
-    wide_covariance_(n + j, n + j) = input_variance(j, measured_input);
+    wide_mean_[n + j] = input_[j];
+    wide_covariance_(n + j, n + j) = input_variances_[j];
+    for (int r = 0; guesses_inputs_ && is_missing_[j] && r < n; ++r)
+      wide_covariance_(r, n + j) = wide_covariance_(n + j, r) = input_guess_.with_state()(r, j);
+    for (int k = 0; guesses_inputs_ && is_missing_[j] && k < nu_; ++k)
+      wide_covariance_(n + j, n + k) += input_guess_.covariance()(j, k);
   }
   for (int j = 0; j < np_; ++j) {
     wide_mean_[n + nu_ + j] = 0.0;
@@ -195,6 +199,7 @@ void KalmanFilter::linearise_times(const MeasuredInterval& interval, int count, 
   request.next_states = next_states_.data();
   request.jacobians = jacobians_.data();
   model_->integrate(request);
+  hold_factors(jacobians_.data(), count);
   const int curved = is_curved_ ? static_cast<int>(curved_.size()) : 0;
   for (int k = 0; k < count; ++k) {
     const double share = from_first(interval, seconds[k]);
@@ -329,6 +334,19 @@ void KalmanFilter::take_wide(double innovation, double variance) noexcept {
   between_log_likelihood_ -= 0.5 * std::min(innovation * innovation / total, 16.0) + 0.5 * std::log(total);
 }
 
+/// Moments of guessed inputs, given what was measured on the interval.
+void KalmanFilter::take_guessed_inputs() noexcept {
+  const int n = nx_ + np_;
+  for (int j = 0; j < nu_; ++j) {
+    if (!is_missing_[j]) continue;
+    input_guess_.set(j, wide_mean_[n + j]);
+    for (int k = 0; k < nu_; ++k)
+      if (is_missing_[k]) input_guess_.set_covariance(j, k, wide_covariance_(n + j, n + k));
+    for (int r = 0; r < n; ++r) input_guess_.set_with_state(r, j, wide_work_(r, n + j));
+  }
+  input_guess_.predicted(mean, covariance);
+}
+
 /// To the interval's end, linearised about `point_`: x as integrated from there, p with its change.
 void KalmanFilter::narrow() noexcept {
   const int n = nx_ + np_;
@@ -361,6 +379,7 @@ void KalmanFilter::narrow() noexcept {
   make_symmetric();
   std::copy(next_.begin(), next_.end(), mean.data());
   std::copy_n(wide_end_.data(), np_, mean.data() + nx_);
+  if (guesses_inputs_) take_guessed_inputs();
   clip();
 }
 

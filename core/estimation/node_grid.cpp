@@ -228,7 +228,8 @@ const double* NodeGrid::mean_input(double from, double to) noexcept {
   const std::size_t behind = inputs_.first_after(from);
   for (std::size_t i = behind > 0 ? behind - 1 : 0; i < inputs_.size(); ++i) {
     const double start = std::max(inputs_.time(i), from);
-    const double end = i + 1 < inputs_.size() ? std::min(inputs_.time(i + 1), to) : to;
+    const double last = i + 1 < inputs_.size() ? std::min(inputs_.time(i + 1), to) : to,
+                 end = std::min(last, inputs_.time(i) + hold_);
     if (inputs_.time(i) >= to - setup_.tolerance) break;
     const double seconds = end - start;
     if (seconds <= 0.0) continue;

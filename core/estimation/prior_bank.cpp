@@ -204,13 +204,12 @@ PriorBank::PriorBank(std::shared_ptr<const Model> model, Setup setup)
     ahead_->surprises.assign(ny_ * M, 0.0);
     ahead_->kept_rows.assign(setup_.scaled_outputs.size() * (1 + nx) * M, 0.0);
     learnt_.resize(learnt_.size() + ahead_->excitation.history_size(), 0.0);
-    ahead_->no_input.assign(nu_, 0.0);
     const auto a = static_cast<std::size_t>(wide_count());
     for (auto* v : {&ahead_->next_point, &ahead_->trial_mean}) v->assign(a * M, 0.0);
     ahead_->trial_covariance.assign(a * a * M, 0.0);
     ahead_->moved.assign(M, 0.0);
   }
-  if (setup_.most_between > 0 || looks_ahead()) {
+  {
     const std::size_t a = static_cast<std::size_t>(wide_count()),
                       times = std::size_t{1} + (ahead_ ? ahead_->mixture.summary().most() : setup_.most_between);
     for (auto* v : {&wide_mean_, &wide_before_, &point_}) v->assign(a * M, 0.0);
@@ -244,6 +243,8 @@ PriorBank::PriorBank(std::shared_ptr<const Model> model, Setup setup)
   is_own_.assign(n_, 0);
   full_mean_ = Eigen::VectorXd::Zero(n_);
   full_covariance_ = Eigen::MatrixXd::Zero(n_, n_);
+  guesses_.assign(M, InputGuess(model_->description().inputs, n_));
+  factors_ = std::make_unique<InputFactors>(*model_);
   views_ = std::make_unique<Views>();
   for (const Process& process : processes_)
     views_->processes.push_back(
@@ -330,6 +331,7 @@ void PriorBank::reset(const Eigen::Ref<const Eigen::VectorXd>& state,
   std::fill(log_likelihoods_.begin(), log_likelihoods_.end(), 0.0);
   for (int m = 0; m < members_; ++m) weights_[m] = 1.0 / members_;
   reset_noise();
+  for (InputGuess& guess : guesses_) guess.forget();
   distance_ = 0.0;
 }
 
@@ -365,6 +367,7 @@ void PriorBank::update(Measured y, const double* robust_weights) noexcept {
   }
   log_likelihood_ = take_outputs(frame, y.values, robust_weights);
   if (y.weights && setup_.robust.empty()) spread_variances();
+  update_guesses();
   keep_near_bounds();
 }
 
@@ -522,12 +525,7 @@ void PriorBank::mix_members() noexcept {
 
 /// All that an interval asks for before the members move: inputs, ground, processes, and another law.
 void PriorBank::begin_step(const MeasuredInterval& interval) noexcept {
-  for (int j = 0; j < nu_; ++j) {
-    const bool missing = std::isnan(interval.inputs[j]);
-    const double wide = unknown_sigma(model_->description().inputs[j]);
-    input_[j] = missing ? 0.0 : interval.inputs[j];
-    variances_[j] = missing ? wide * wide : setup_.input_variances[j];
-  }
+  begin_inputs(interval);
   between_log_likelihood_ = 0.0;
   find_distance(input_.data(), interval.duration);
   advance_processes({interval.duration, distance_, interval.ends_with_jump});
@@ -566,6 +564,7 @@ void PriorBank::integrate_members(const double* mean, bool is_wide, double secon
                      .substeps = setup_.substeps,
                      .next_states = next_rows_.data(),
                      .jacobians = jacobian_rows_.data()});
+  if (guesses_.front().is_any_missing()) hold_factors();
   for (int m = 0; m < lanes_; ++m) {
     for (int r = 0; r < nx_; ++r) next_[r * lanes_ + m] = next_rows_[m * nx_ + r];
     for (int e = 0; e < nx_ * columns; ++e) jacobian_[e * lanes_ + m] = jacobian_rows_[m * nx_ * columns + e];
@@ -596,11 +595,20 @@ void PriorBank::moments(Eigen::VectorXd& mean, Eigen::MatrixXd& covariance) noex
   }
 }
 
+std::size_t PriorBank::state_size() const noexcept {
+  return mean_.size() + covariance_.size() + weights_.size() + learnt_.size() +
+         guesses_.size() * guesses_.front().state_size();
+}
+
 void PriorBank::save(double* state) const noexcept {
   state = std::copy(mean_.begin(), mean_.end(), state);
   state = std::copy(covariance_.begin(), covariance_.end(), state);
   state = std::copy(weights_.begin(), weights_.end(), state);
-  std::copy(learnt_.begin(), learnt_.end(), state);
+  state = std::copy(learnt_.begin(), learnt_.end(), state);
+  for (const InputGuess& guess : guesses_) {
+    guess.save(state);
+    state += guess.state_size();
+  }
 }
 
 void PriorBank::restore(const double* state) noexcept {
@@ -612,6 +620,10 @@ void PriorBank::restore(const double* state) noexcept {
   take(covariance_);
   take(weights_);
   take(learnt_);
+  for (InputGuess& guess : guesses_) {
+    guess.restore(state);
+    state += guess.state_size();
+  }
   spread_variances();
 }
 

@@ -28,12 +28,13 @@ void PriorBank::predict(const MeasuredInterval& measured, Measured end_outputs) 
   std::ranges::fill(added_, 0.0);
   const bool has_motion = measures_motion(setup_.motion_outputs, measured, static_cast<std::size_t>(ny_), end_outputs);
   begin_step(measured);
-  if (measured.between == 0 && !has_motion) {
+  const bool is_any_missing = guesses_.front().is_any_missing();
+  if (measured.between == 0 && !has_motion && !is_any_missing) {
     integrate_members(mean_.data(), false, measured.duration, 1.0);
     take_linearised_step();
     return keep_near_bounds();
   }
-  RHEC_ASSERT(!wide_mean_.empty(), "a bank that was set up for measurements between nodes");
+  RHEC_ASSERT(measured.between <= setup_.most_between, "a bank that was set up for measurements between nodes");
   widen();
   if (ahead_) ahead_->end_outputs = end_outputs;
   const MeasuredInterval interval = has_motion ? look_ahead(measured, end_outputs) : measured;
@@ -44,8 +45,9 @@ void PriorBank::predict(const MeasuredInterval& measured, Measured end_outputs) 
     point_ = wide_mean_;
     integrate_members(point_.data(), true, interval.duration, 1.0);
   }
-  if (interval.between > 0) {
+  if (interval.between > 0 || is_any_missing) {
     narrow();
+    take_guesses();
   } else {
     take_step_from_point();
   }
@@ -67,8 +69,8 @@ MeasuredInterval PriorBank::look_ahead(const MeasuredInterval& measured, Measure
     for (int m = 0; m < members_; ++m) ahead_->ramp_variances[j] += weights_[m] * process.ramp[m] * process.Q[m];
   }
   moments(ahead_->mixture.mean, ahead_->mixture.covariance);
-  const MeasuredInterval interval = ahead_->mixture.look_ahead(measured, ahead_->no_input.data(),
-                                                               ahead_->ramp_variances.data(), nullptr, end_outputs);
+  const MeasuredInterval interval =
+      ahead_->mixture.look_ahead(measured, input_.data(), ahead_->ramp_variances.data(), nullptr, end_outputs);
   is_curved_ = !ahead_->mixture.curved().empty();
   const Eigen::VectorXd& found = ahead_->mixture.point();
   point_ = wide_mean_;
@@ -168,6 +170,7 @@ void PriorBank::widen() noexcept {
     std::fill_n(wide_mean_.begin() + (n_ + j) * M, M, input_[j]);
     std::fill_n(P(n_ + j, n_ + j), M, variances_[j]);
   }
+  if (guesses_.front().is_any_missing()) widen_guesses();
   for (const Process& process : processes_) {
     const std::ptrdiff_t first = n_ + nu_ + process.first - nx_;
     for (std::ptrdiff_t c = 0; c < process.count; ++c)

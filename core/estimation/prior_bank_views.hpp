@@ -38,7 +38,7 @@ struct PriorBank::LookAhead {
   std::vector<int> curved_outputs;  ///< of motion
   Curvature output_curvature = {};  ///< of these, by the state
   AlignedDoubles next_point = {}, moved = {}, trial_mean = {}, trial_covariance = {};  ///< of the wide vector
-  std::vector<double> ramp_variances = {}, no_input = {};
+  std::vector<double> ramp_variances = {};
   std::vector<double> shares = {};  ///< of the interval, at its measurements
   std::vector<double> part = {};    ///< n_y: some of the outputs of a time
   AlignedDoubles surprises = {};    ///< n_y, lanes

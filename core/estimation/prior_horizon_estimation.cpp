@@ -5,6 +5,7 @@
 #include <limits>
 #include <utility>
 
+#include "missing_inputs.hpp"
 #include "node_covariance.hpp"
 #include "prior_restart.hpp"
 #include "process_problem.hpp"
@@ -227,11 +228,19 @@ void PriorHorizonEstimation::rehearse() noexcept {
 
 void PriorHorizonEstimation::estimate(Estimate& result, Clock::time_point deadline) noexcept {
   if (filters_.is_searching()) return filters_.estimate(result, deadline);
-  const int nx = model().state_count(), np = model().parameter_count();
   hand_weights_on();
   filters_.history().bank().moments(mean_, mixture_);
   choose_law();
   fill_window();
+  if (lacks_inputs(problem_)) {
+    // Without a prior of them a window makes of them what it likes.
+    has_solution_ = result.fallback = result.predicted = false;
+    start_cold(point_);
+    solver_->reset();
+    result.report = {};
+    result.report.status = Status::solved;
+    return give_out(result);
+  }
   // What the solver has prepared in a rehearsal was for other data.
   if (std::exchange(has_rehearsed_, false)) solver_->prepare(point_);
   result.report = solver_->solve(point_, deadline);
@@ -257,6 +266,12 @@ void PriorHorizonEstimation::estimate(Estimate& result, Clock::time_point deadli
   } else if (!is_doubtful) {
     combine(result);
   }
+  give_out(result);
+}
+
+/// The moments of all.
+void PriorHorizonEstimation::give_out(Estimate& result) noexcept {
+  const int nx = model().state_count(), np = model().parameter_count();
   filters_.fuse_place(mean_, mixture_);
   result.state = mean_.head(nx);
   result.parameters = mean_.tail(np);

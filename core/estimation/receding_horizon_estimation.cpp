@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "block_structure.hpp"
+#include "missing_inputs.hpp"
 #include "node_covariance.hpp"
 #include "noise_blocks.hpp"
 #include "prior_restart.hpp"
@@ -444,6 +445,7 @@ void RecedingHorizonEstimation::estimate(Estimate& result, Clock::time_point dea
     return covariance(heading, heading) <= uncertain_angle * uncertain_angle;
   };
   if (searching_ && remembers && is_known(arrival_.covariance())) searching_ = false;
+  if (lacks_inputs(problem_)) return filter_window(newest, result);
   if (searching_) search_heading(deadline);
   result.report = solver_->solve(point_, deadline);
   if (result.report.status == Status::iteration_limit || result.report.status == Status::stalled) {
@@ -461,6 +463,24 @@ void RecedingHorizonEstimation::estimate(Estimate& result, Clock::time_point dea
   RHEC_ASSERT(result.state.allFinite() && result.parameters.allFinite(), "an estimate is finite");
   // An arrival cost without memory never determines the heading; use the covariance of the estimate instead.
   if (searching_ && !remembers && is_known(result.covariance)) searching_ = false;
+}
+
+/// The estimate where some inputs were not measured, and a guess for when they are again.
+void RecedingHorizonEstimation::filter_window(int newest, Estimate& result) noexcept {
+  const int nx = model_->state_count(), np = model_->parameter_count();
+  const KalmanFilter* filter = &arrival_.begin_filtering(problem_);
+  for (int i = 0; i < newest; ++i) filter = &arrival_.filter_interval(problem_, i);
+  result.fallback = result.predicted = false;
+  result.report = {};
+  result.report.status = Status::solved;
+  solved_ = true;
+  if (filter->mean.allFinite()) last_state_ = filter->mean;
+  result.state = last_state_.head(nx);
+  result.parameters = last_state_.segment(nx, np);
+  result.covariance = filter->covariance.topLeftCorner(nx + np, nx + np);
+  start_cold(point_);
+  if (!point_.is_finite()) recover();
+  solver_->reset();
 }
 
 /// Covariance of the state of a node and the parameters before it. If it is not finite, the last one is kept.

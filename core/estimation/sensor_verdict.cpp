@@ -190,6 +190,8 @@ void SensorWatch::assess(const Estimate& estimate, std::span<const Presence> pre
   health.level = is_lost ? HealthLevel::lost : has_finding ? HealthLevel::degraded : HealthLevel::ok;
 }
 
+void SensorWatch::begin_predicting() noexcept { memory_->trial->inputs() = own_->filter.inputs(); }
+
 void SensorWatch::predict(double duration, const double* inputs, const double* input_sigmas,
                           Estimate& estimate) noexcept {
   WalkingFilter& filter = *memory_->trial;

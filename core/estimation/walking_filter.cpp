@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <span>
 
 #include "innovation.hpp"
 #include "rhec/core/base/angle.hpp"
@@ -25,7 +26,6 @@ WalkingFilter::WalkingFilter(std::shared_ptr<const Model> model, const Setup& se
     : setup_(setup), filter_(std::move(model), setup.noise, setup.substeps), outputs_(filter_.model().output_count()) {
   const Model& m = filter_.model();
   ramp_variances_.assign(m.parameter_count(), 0.0);
-  guess_.assign(m.input_count(), 0.0);
   image_ = Eigen::MatrixXd::Zero(m.state_count(), m.output_count());
 }
 
@@ -50,16 +50,18 @@ void WalkingFilter::predict(const double* inputs, double duration, const double*
       static_cast<int>(std::min<double>(most_parts, std::max(1.0, std::ceil(duration / setup_.step - 1e-6))));
   const double part = duration / parts, ratio = part / setup_.step,
                steps = std::abs(ratio - 1.0) < rounding ? 1.0 : ratio;
-  const bool is_kept = memo_ && parts == 1 && !more_sigmas;
-  if (is_kept) memo_->prediction.begin({inputs, guess_.size()}, duration, filter_);
+  const std::span given(inputs, setup_.noise.input_variances.size());
+  const bool is_any_missing = std::ranges::any_of(given, [](double value) { return std::isnan(value); });
+  const bool is_kept = memo_ && parts == 1 && !more_sigmas && !is_any_missing;
+  if (is_kept) memo_->prediction.begin(given, duration, filter_);
   for (std::size_t j = 0; j < setup_.walk.size(); ++j) ramp_variances_[j] = setup_.walk[j] * setup_.walk[j] * steps;
-  for (std::size_t j = 0; more_sigmas && j < guess_.size(); ++j)
+  for (std::size_t j = 0; more_sigmas && j < given.size(); ++j)
     filter_.set_input_variance(static_cast<int>(j), setup_.noise.input_variances[j] + more_sigmas[j] * more_sigmas[j]);
   for (int i = 0; i < parts; ++i) {
     if (setup_.has_ramps) {
-      filter_.predict(inputs, guess_.data(), part, ramp_variances_.data());
+      filter_.predict(inputs, nullptr, part, ramp_variances_.data());
     } else {
-      filter_.predict(inputs, guess_.data(), part);
+      filter_.predict(inputs, nullptr, part);
       for (std::size_t j = 0; j < setup_.walk.size(); ++j)
         filter_.add_parameter_variance(static_cast<int>(j), ramp_variances_[j]);
     }
@@ -67,7 +69,7 @@ void WalkingFilter::predict(const double* inputs, double duration, const double*
     if (deviations) filter_.carry(*deviations);
     if (more_sigmas) limit_states();
   }
-  for (std::size_t j = 0; more_sigmas && j < guess_.size(); ++j)
+  for (std::size_t j = 0; more_sigmas && j < given.size(); ++j)
     filter_.set_input_variance(static_cast<int>(j), setup_.noise.input_variances[j]);
 }
 

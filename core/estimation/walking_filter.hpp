@@ -53,6 +53,9 @@ class WalkingFilter {
   /// Innovation of a sensor's measured outputs by what was expected last, its covariance and NIS. False, and nothing
   /// else, where none is measured.
   bool innovation(const Sensor& sensor, Measured outputs, Innovation& result) noexcept;
+  /// What the outputs have said of inputs that were not measured.
+  const InputGuess& inputs() const noexcept { return filter_.inputs(); }
+  InputGuess& inputs() noexcept { return filter_.inputs(); }
   /// Whether an expected output depends on a state.
   bool depends_on(int output, int state) const noexcept;
   double expected(int output) const noexcept { return filter_.expected_outputs()[output]; }
@@ -68,7 +71,7 @@ class WalkingFilter {
   KalmanFilter filter_;
   int outputs_;  ///< n_y
   std::shared_ptr<FilterMemo> memo_;
-  std::vector<double> ramp_variances_, guess_;
+  std::vector<double> ramp_variances_;
   Eigen::MatrixXd image_;  ///< P H'
 };
 

@@ -161,14 +161,15 @@ TEST(ArrivalCost, ARobustResidualLeavesWithItsWeight) {
   }
 }
 
+/// It is that of a filter, whatever the solution is.
 TEST(ArrivalCost, AnUnmeasuredInputIsAnUnknownOne) {
   OneInterval window(linear_model<Trolley>());
   window.problem.measured_input(0)[0] = nan;
   Noise noise = noise_of(*window.model);
-  noise.inputs[0] = 100.0;
+  noise.inputs[0] = 3.0 * window.model->description().inputs[0].scale;
   ReferenceFilter reference(*window.model, noise, {});
   reference.update({.outputs = {window.problem.output(0)[0], window.problem.output(0)[1]}});
-  reference.predict(0, {.duration = 0.2, .inputs = {window.solution.control(0)[0]}});
+  reference.predict(0, {.duration = 0.2, .inputs = {0.0}});
   for (const ArrivalKind kind : recursive) {
     ArrivalCost cost = window.arrival(kind);
     cost.slide(window.problem, window.solution, {});

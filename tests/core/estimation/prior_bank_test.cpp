@@ -26,8 +26,8 @@ using namespace testing;
 
 double largest(const Eigen::MatrixXd& matrix) { return matrix.cwiseAbs().maxCoeff(); }
 
-/// The textbook's Kalman filter on [x; z] of a linear model and one prior a parameter. Its matrices are differences of
-/// the model's own results.
+/// The textbook's Kalman filter on [x; z; u] of a linear model and one prior a parameter, with the inputs u that are
+/// missing and walk. Its matrices are differences of the model's own results.
 class DenseFilter {
  public:
   DenseFilter(const Model& model, PriorCombination priors)
@@ -39,6 +39,10 @@ class DenseFilter {
     }
     mean = Eigen::VectorXd::Zero(n_);
     covariance = Eigen::MatrixXd::Zero(n_, n_);
+    inputs_ = Eigen::VectorXd::Zero(model.input_count());
+    of_inputs_ = Eigen::MatrixXd::Zero(model.input_count(), model.input_count());
+    with_inputs_ = Eigen::MatrixXd::Zero(n_, model.input_count());
+    for (int j = 0; j < model.input_count(); ++j) of_inputs_(j, j) = most_variance(j);
     for (int j = 0; j < np_; ++j) {
       const int count = priors_[j]->state_count();
       Eigen::MatrixXd P(count, count);
@@ -49,12 +53,19 @@ class DenseFilter {
 
   void predict(const Sample& sample, const std::vector<double>& input_variances, bool ends_with_jump = false) {
     const int nu = model_.input_count();
-    std::vector<double> input(nu), variances(nu);
     for (int j = 0; j < nu; ++j) {
-      const bool missing = std::isnan(sample.inputs[j]);
-      input[j] = missing ? 0.0 : sample.inputs[j];
-      variances[j] = missing ? std::pow(100.0 * model_.description().inputs[j].scale, 2) : input_variances[j];
+      const double scale = model_.description().inputs[j].scale, walk = scale * scale * sample.duration;
+      if (std::isnan(sample.inputs[j])) {
+        of_inputs_(j, j) = std::max(of_inputs_(j, j), std::min(of_inputs_(j, j) + walk, most_variance(j)));
+        continue;
+      }
+      of_inputs_.row(j).setZero();
+      of_inputs_.col(j).setZero();
+      with_inputs_.col(j).setZero();
+      inputs_[j] = sample.inputs[j];
+      of_inputs_(j, j) = input_variances[j];
     }
+    const std::vector<double> input(inputs_.begin(), inputs_.end());
     Eigen::MatrixXd F = Eigen::MatrixXd::Zero(n_, n_), Q = F;
     for (int j = 0; j < np_; ++j) {
       const int count = priors_[j]->state_count();
@@ -94,15 +105,21 @@ class DenseFilter {
       A.col(k) = next(Eigen::VectorXd::Unit(n_, k), none, rest) - at;
       if (k >= nx_) G.col(k) = next(none, Eigen::VectorXd::Unit(n_, k), rest) - at;
     }
-    Eigen::VectorXd input_noise(nu);
     for (int j = 0; j < nu; ++j) {
       std::vector<double> one(nu, 0.0);
       one[j] = 1.0;
       B.col(j) = next(none, none, one) - at;
-      input_noise[j] = variances[j];
     }
     mean = next(mean, none, input);
-    covariance = A * covariance * A.transpose() + B * input_noise.asDiagonal() * B.transpose() + G * Q * G.transpose();
+    const Eigen::MatrixXd crossed = A * with_inputs_ * B.transpose();
+    covariance = A * covariance * A.transpose() + crossed + crossed.transpose() + B * of_inputs_ * B.transpose() +
+                 G * Q * G.transpose();
+    with_inputs_ = A * with_inputs_ + B * of_inputs_;
+    for (int j = 0; j < nu; ++j) {
+      if (std::isnan(sample.inputs[j])) continue;
+      with_inputs_.col(j).setZero();
+      of_inputs_(j, j) = 0.0;
+    }
   }
 
   /// Returns -2 log likelihood, without constants.
@@ -124,6 +141,10 @@ class DenseFilter {
       const Eigen::VectorXd gain = covariance * h / S;
       mean += gain * innovation;
       covariance -= gain * S * gain.transpose();
+      const Eigen::VectorXd of_inputs = with_inputs_.transpose() * h;
+      inputs_ += of_inputs * innovation / S;
+      of_inputs_ -= of_inputs * of_inputs.transpose() / S;
+      with_inputs_ -= gain * of_inputs.transpose();
       sum += innovation * innovation / S + std::log(S);
     }
     return sum;
@@ -137,6 +158,7 @@ class DenseFilter {
   Eigen::MatrixXd covariance;
 
  private:
+  double most_variance(int input) const { return std::pow(3.0 * model_.description().inputs[input].scale, 2); }
   Eigen::MatrixXd chosen() const {
     Eigen::MatrixXd pick = Eigen::MatrixXd::Zero(nx_ + np_, n_);
     pick.leftCols(nx_).topRows(nx_).setIdentity();
@@ -148,6 +170,8 @@ class DenseFilter {
   PriorCombination priors_;
   int nx_, np_, n_ = 0;
   std::vector<int> first_;
+  Eigen::VectorXd inputs_;
+  Eigen::MatrixXd of_inputs_, with_inputs_;
 };
 
 TEST(PriorBank, IsTheKalmanFilterOfItsPriorOnALinearModel) {
@@ -161,7 +185,11 @@ TEST(PriorBank, IsTheKalmanFilterOfItsPriorOnALinearModel) {
     bank.reset(start, spread);
     reference.mean.head(4) = start;
     reference.covariance.topLeftCorner(4, 4) = spread;
-    const auto samples = simulate(*model, 60, false, 5);
+    auto samples = simulate(*model, 60, false, 5);
+    for (int k = 22; k <= 60; ++k) {
+      if (k < 40) samples[k].inputs[0] = nan;
+      if (k > 32) samples[k].inputs[1] = nan;
+    }
     Eigen::VectorXd mean;
     Eigen::MatrixXd covariance;
     for (int k = 0; k <= 60; ++k) {

@@ -62,6 +62,12 @@ class RHEC_EXPORT ArrivalCost {
   /// Writes mean and information matrix into a problem.
   void write(RheProblem& problem) noexcept;
 
+  /// A filter over a window of which not all inputs were measured, from the prior on: a window by itself would make of
+  /// them what it likes, since nothing but the outputs limits them. Goes to the first node, with its outputs; then on
+  /// to the next one, interval by interval.
+  const KalmanFilter& begin_filtering(const RheProblem& problem) noexcept;
+  const KalmanFilter& filter_interval(const RheProblem& problem, int interval) noexcept;
+
  private:
   void find_weights(const RheProblem& problem, const Iterate& solution) noexcept;
   void filter_first_interval(const RheProblem& problem, const Iterate& solution) noexcept;
@@ -73,6 +79,8 @@ class RHEC_EXPORT ArrivalCost {
   ArrivalKind kind_;
   std::vector<ParameterWalk> walks_;
   KalmanFilter filter_;  ///< holds mean and covariance for every kind
+  KalmanFilter ahead_;   ///< of a window without all of its inputs
+  InputFactors factors_;
   Eigen::MatrixXd initial_covariance_;
   /// For each measurement between the first two nodes: its weights, and its residuals with their gradients.
   std::vector<double> between_weights_, between_rows_, between_scratch_;

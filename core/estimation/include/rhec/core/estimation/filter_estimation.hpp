@@ -53,6 +53,7 @@ class RHEC_EXPORT FilterEstimation final : public EstimationMethod {
   struct Moments {
     Eigen::VectorXd mean;
     Eigen::MatrixXd covariance;
+    std::vector<double> inputs;  ///< of InputGuess
     double log_likelihood = 0.0;
   };
   struct Node {
@@ -72,7 +73,7 @@ class RHEC_EXPORT FilterEstimation final : public EstimationMethod {
   std::vector<Node> nodes_;      ///< the last ones, in a ring
   std::int64_t newest_ = -1;     ///< -1: none
   std::int64_t remembered_ = 0;  ///< how many are known
-  std::vector<double> ramp_variances_, no_input_, predicted_, jacobian_;
+  std::vector<double> ramp_variances_, predicted_, jacobian_;
 };
 
 }  // namespace rhec

@@ -8,6 +8,8 @@
 
 #include "rhec/core/base/aligned.hpp"
 #include "rhec/core/estimation/curvature.hpp"
+#include "rhec/core/estimation/input_factors.hpp"
+#include "rhec/core/estimation/input_guess.hpp"
 #include "rhec/core/estimation/reading_summary.hpp"
 #include "rhec/core/estimation/scaled_output.hpp"
 #include "rhec/core/horizon/measured_interval.hpp"
@@ -48,8 +50,8 @@ class RHEC_EXPORT KalmanFilter {
   const double* output_jacobian() const noexcept { return output_jacobian_.data(); }
   /// `update` after `expect`, if the mean is the same.
   void update_as_expected(Measured y) noexcept;
-  /// Time update by `duration` [s] with a measured input (n_u). Where it is missing (NaN), the guess replaces it, with
-  /// the standard deviation `unknown_sigma`.
+  /// Time update by `duration` [s] with a measured input (n_u). Where it is missing (NaN), the guess (n_u) replaces it,
+  /// with the standard deviation `unknown_sigma`; if that is null, what the filter knows of it (InputGuess).
   void predict(const double* measured_input, const double* input_guess, double duration) noexcept;
   /// The same if parameters jump or ramp during the interval: variances (n_p, 0 without a jump) of the change.
   void predict(const double* measured_input, const double* input_guess, double duration,
@@ -110,12 +112,16 @@ class RHEC_EXPORT KalmanFilter {
   void set_input_variance(int input, double variance) noexcept { noise_.input_variances[input] = variance; }
   void set_output_variance(int output, double variance) noexcept { noise_.output_variances[output] = variance; }
 
+  /// What is known of inputs that are not measured, for a filter that takes up the moments of another time.
+  InputGuess& inputs() noexcept { return input_guess_; }
+  const InputGuess& inputs() const noexcept { return input_guess_; }
+
   const Model& model() const noexcept { return *model_; }
   const Noise& noise() const noexcept { return noise_; }
 
  private:
   void differentiate(double duration) noexcept;
-  void widen(const double* measured_input, const double* input_guess, const double* ramp_variances) noexcept;
+  void widen(const double* ramp_variances) noexcept;
   double expect_wide(int output, double measured) noexcept;
   void find_curvature(const MeasuredInterval& interval, int step) noexcept;
   void write_hessians(const MeasuredInterval& interval) noexcept;
@@ -128,7 +134,9 @@ class RHEC_EXPORT KalmanFilter {
   void take_between(const MeasuredInterval& interval, int which, const double* weights) noexcept;
   void take_wide(double innovation, double variance) noexcept;
   void narrow() noexcept;
-  double input_variance(int input, const double* measured) const noexcept;
+  void begin_inputs(const double* measured, const double* guess, double duration) noexcept;
+  void hold_factors(double* jacobians, int count) const noexcept;
+  void add_guessed_inputs(const double*transition) noexcept, take_guessed_inputs() noexcept;
   void take_outputs(Measured y) noexcept;
   void linearise_outputs() noexcept;
   void find_scale_slopes(Measured y) noexcept;
@@ -146,7 +154,11 @@ class RHEC_EXPORT KalmanFilter {
   std::vector<double> innovations_, innovation_variances_;  ///< n_y, of the last update
   Eigen::MatrixXd gains_;                                   ///< (n_x + n_p) x n_y, likewise
   Eigen::MatrixXd before_;                                  ///< an update: the covariance
-  std::vector<double> predicted_, output_jacobian_, next_, jacobian_, input_;
+  std::vector<double> predicted_, output_jacobian_, next_, jacobian_;
+  InputGuess input_guess_;
+  InputFactors input_factors_;
+  std::vector<double> input_, input_variances_;  ///< of the interval; without those of `input_guess_`
+  Eigen::MatrixXd guessed_;                      ///< n x n_u, of a step: what a guessed input has in the state
   AlignedDoubles row_, next_row_, jacobian_rows_, scratch_;  ///< for Model::integrate_rows
   Eigen::MatrixXd work_, next_covariance_;
   Eigen::VectorXd gain_, image_, zeros_, correction_;
@@ -157,7 +169,8 @@ class RHEC_EXPORT KalmanFilter {
   Eigen::VectorXd wide_mean_, wide_gradient_, wide_gain_, wide_image_, wide_end_;
   Eigen::MatrixXd wide_covariance_, transition_, wide_work_;
   std::vector<int> curved_;
-  bool is_curved_ = false;  ///< whether the interval has second-order terms
+  bool is_curved_ = false;       ///< whether the interval has second-order terms
+  bool guesses_inputs_ = false;  ///< whether some of its inputs are those of `input_guess_`
   Curvature curvature_;
   std::vector<std::uint8_t> is_missing_;  ///< per input
   ReadingSummary summary_;                ///< of outputs of motion

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "rhec/core/estimation/stamped_rows.hpp"
@@ -76,6 +77,8 @@ class RHEC_EXPORT NodeGrid {
   MeasuredInterval interval() const noexcept { return between_.over(duration_, mean_.data(), ends_with_jump_); }
   /// Whether the newest node gives way to the next measurement.
   bool ends_open() const noexcept { return count_ > 0 && node(count_ - 1).kind == Kind::end; }
+  /// From now on an input holds for so long [s] where none follows; at first for ever.
+  void hold_inputs(double seconds) noexcept { hold_ = seconds; }
   /// Means over a time of inputs that hold from their stamps on, n_u; NaN if none is known.
   const double* mean_input(double from, double to) noexcept;
   /// Measurements that no node has used, for lack of room.
@@ -105,6 +108,7 @@ class RHEC_EXPORT NodeGrid {
 
   Setup setup_;
   double near_;  ///< how far a node is moved at most [s]
+  double hold_ = std::numeric_limits<double>::infinity();
   MeasuredRows measurements_;
   StampedRows inputs_;
   std::vector<Node> nodes_;  ///< the newest ones, in a ring

@@ -10,6 +10,8 @@
 #include <Eigen/Core>
 
 #include "rhec/core/base/aligned.hpp"
+#include "rhec/core/estimation/input_factors.hpp"
+#include "rhec/core/estimation/input_guess.hpp"
 #include "rhec/core/estimation/prior_bank_setup.hpp"
 #include "rhec/core/horizon/measured_interval.hpp"
 #include "rhec/core/model/model.hpp"
@@ -42,9 +44,9 @@ class RHEC_EXPORT PriorBank {
   /// The weight, above 0 and at most 1, by which the last update scaled an output's information, for the most probable
   /// member; 1 without a robust loss.
   double robust_weight(int output) const noexcept;
-  /// Time update over an interval. An input that is missing is 0, with the standard deviation `unknown_sigma`.
+  /// Time update over an interval. Of an input that is missing each member knows what it can (InputGuess).
   /// Measurements between the two nodes are each used at its own time. The noise of an input and of a process is one
-  /// value over the interval, as a window has it, so that the moments are those of a window.
+  /// value over the interval, as of a window.
   /// `end_outputs` (n_y, NaN where missing, or null) are those of the interval's end, for `update` to use afterwards:
   /// the interval is linearised where its outputs of motion put it, as by KalmanFilter::predict.
   void predict(const MeasuredInterval& interval, Measured end_outputs = nullptr) noexcept;
@@ -57,8 +59,8 @@ class RHEC_EXPORT PriorBank {
   int most_between() const noexcept { return setup_.most_between; }
   /// Probability of each member.
   std::span<const double> weights() const noexcept { return {weights_.data(), static_cast<std::size_t>(members_)}; }
-  /// Sum over the updates since `reset` of each member's log likelihood (less a constant common to all), which decides
-  /// between laws that do not change: weights have a floor. Neither `save` nor `restore` touches it.
+  /// Sum over the updates since `reset` of each member's log likelihood (less a constant common to all): weights have a
+  /// floor. Neither `save` nor `restore` touches it.
   std::span<const double> log_likelihoods() const noexcept {
     return {log_likelihoods_.data(), static_cast<std::size_t>(members_)};
   }
@@ -72,14 +74,11 @@ class RHEC_EXPORT PriorBank {
   int state_count() const noexcept { return n_; }
 
   /// All that changes: moments, weights, and noise learnt. `state_size` doubles.
-  std::size_t state_size() const noexcept {
-    return mean_.size() + covariance_.size() + weights_.size() + learnt_.size();
-  }
+  std::size_t state_size() const noexcept;
   void save(double* state) const noexcept;
   void restore(const double* state) noexcept;
 
-  /// What a window needs of a member to take its place, on the states that the member's own priors have; the others are
-  /// 0, and nothing depends on them.
+  /// What a window needs of a member to take its place, on the states of the member's own priors; the others are 0.
   /// Moments of [x; z] (n, n x n) in what `save` has written; the others have the variance 1.
   void saved_moments(const double* state, int member, Eigen::VectorXd& mean, Eigen::MatrixXd& covariance) noexcept;
   /// Adds the probabilities of the members in what `save` has written.
@@ -121,8 +120,9 @@ class RHEC_EXPORT PriorBank {
   struct Frame;  ///< what outputs are taken in by
   int view_outputs(const double* gradients, std::ptrdiff_t entries, const double* y) noexcept;
   double take_outputs(const Frame& frame, const double* y, const double* robust_weights) noexcept;
-  void begin_step(const MeasuredInterval& interval) noexcept;
-  void take_linearised_step() noexcept;
+  void begin_step(const MeasuredInterval&interval) noexcept, take_linearised_step() noexcept;
+  void begin_inputs(const MeasuredInterval&interval) noexcept, view_member(int lane) noexcept;
+  void widen_guesses() noexcept, take_guesses() noexcept, update_guesses() noexcept, hold_factors() noexcept;
   void integrate_members(const double* mean, bool is_wide, double seconds, double share) noexcept;
   void observe_members(const double* states) noexcept;
   void widen() noexcept;
@@ -130,12 +130,11 @@ class RHEC_EXPORT PriorBank {
   void write_wide_gradient(int output, double share, double from_first, double* gradient) const noexcept;
   MeasuredInterval look_ahead(const MeasuredInterval& measured, Measured end_outputs) noexcept;
   const double* reading_weights(int which) const noexcept;
-  void weigh_readings(int which) noexcept;
+  void weigh_readings(int which) noexcept, add_curvature(double from_first) noexcept;
   void linearise_about_point(const MeasuredInterval& interval, Measured end_outputs) noexcept;
   void linearise_outputs(int which, const double* y, double share, double from_first) noexcept;
   void expect_outputs(int which, const double* y, const double* mean) noexcept;
   bool move_point(const MeasuredInterval& interval, Measured end_outputs) noexcept;
-  void add_curvature(double from_first) noexcept;
   double curvature_factor(int state, int factor, double from_first) const noexcept;
   void take_step_from_point() noexcept, linearise_nodes() noexcept;
   void linearise_given(const double* y) noexcept;
@@ -144,8 +143,7 @@ class RHEC_EXPORT PriorBank {
   int plain_count() const noexcept { return 2 * n_ - nx_ + nu_; }  ///< of the wide vector, without the factors f
   int wide_count() const noexcept;
   void find_distance(const double* input, double duration) noexcept;
-  void advance_processes(const ProcessInterval& way) noexcept;
-  void mix_members() noexcept;
+  void advance_processes(const ProcessInterval&way) noexcept, mix_members() noexcept;
   void find_loss_scales();
   void weigh_outputs(const Frame& frame, const double* y, int taken, const double* given) noexcept;
   void check_map() const;
@@ -187,6 +185,8 @@ class RHEC_EXPORT PriorBank {
   std::vector<double> states_, inputs_, parameters_, ends_, durations_, next_rows_, jacobian_rows_, output_rows_,
       gradient_rows_;
   std::vector<double> input_, variances_;
+  std::vector<InputGuess> guesses_;  ///< of each lane
+  std::unique_ptr<InputFactors> factors_;
   std::vector<std::uint8_t> is_own_;                                               ///< per entry of [x; z]
   std::vector<double> start_, own_, own_covariance_, filled_, filled_covariance_;  ///< moments of one process
   Eigen::VectorXd full_mean_;

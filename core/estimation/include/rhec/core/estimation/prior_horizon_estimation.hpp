@@ -74,6 +74,7 @@ class RHEC_EXPORT PriorHorizonEstimation final : public WindowedEstimation {
   void write_arrival(const double* saved) noexcept;
   void start_cold(Iterate& point) noexcept;
   void combine(Estimate& result) noexcept;
+  void give_out(Estimate& result) noexcept;
 
   /// What the process data of an interval were computed from.
   struct Advance {

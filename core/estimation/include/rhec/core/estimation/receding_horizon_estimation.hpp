@@ -109,6 +109,7 @@ class RHEC_EXPORT RecedingHorizonEstimation final : public WindowedEstimation {
   void start_cold(Iterate& point) noexcept;
   void recover() noexcept;
   void write_covariance(int node, Estimate& result) noexcept;
+  void filter_window(int newest, Estimate& result) noexcept;
 
   std::shared_ptr<const Model> model_;
   Setup setup_;

@@ -97,15 +97,15 @@ class RHEC_EXPORT SensorWatch {
   /// Moments of [x; p] after a time without measurements: [mean; covariance] of an estimate, predicted by `duration`
   /// with an input (n_u), each of which may be off by `input_sigmas` besides its noise (n_u, or null).
   void predict(double duration, const double* inputs, const double* input_sigmas, Estimate& estimate) noexcept;
+  void begin_predicting() noexcept;  ///< the first such prediction follows, from the last sample on
 
   /// By how much larger a covariance is to be, since innovations are correlated (Health::covariance_factor).
   double covariance_factor() const noexcept;
   /// Whether estimates are to be widened: slip may have jumped, or a sensor is off.
   bool is_in_doubt() const noexcept;
   /// Gives an estimate at the last sample the covariance that it has if slip may have jumped, with the probability w
-  /// that the likelihoods of the measurements say: (1 - w) P + w (P1 + d d'), where P1 and d are the covariance with
-  /// such slip and how far its mean is from that of the estimate (moments of a mixture; Bar-Shalom, Li and Kirubarajan
-  /// 2001). The mean stays, so that no wrong measurement moves it.
+  /// that the likelihoods say: (1 - w) P + w (P1 + d d'), where P1 and d are the covariance with such slip and how far
+  /// its mean is from the estimate's (Bar-Shalom, Li and Kirubarajan 2001). The mean stays: no measurement moves it.
   void widen(Estimate& estimate) noexcept;
 
   void begin_innovations() noexcept { innovation_count_ = 0; }

@@ -1,0 +1,70 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+
+#include "rhec/core/base/export.hpp"
+#include "rhec/core/model/model.hpp"
+
+namespace rhec {
+
+/// What a filter of a state x (n) knows of inputs that are not measured. They walk: within a second by their typical
+/// magnitude, up to three times as much as that. The filter's prediction and its updates are those of the joint
+/// Gaussian of x and these inputs u, whose means, covariance V and covariance C with x are kept here. Of an input that
+/// is measured nothing of that is left: its noise is white.
+///
+/// Allocates in its constructor only.
+class RHEC_EXPORT InputGuess {
+ public:
+  /// `states`: n.
+  InputGuess(std::span<const Variable> inputs, Eigen::Index states);
+
+  void forget() noexcept;
+  /// An interval [s] begins at a state with this covariance, with inputs as measured (n_u, NaN where missing).
+  void begin(const double* measured, double duration, const Eigen::Ref<const Eigen::MatrixXd>& of_state) noexcept;
+  bool is_any_missing() const noexcept { return is_any_missing_; }
+  bool is_missing(int input) const noexcept { return is_missing_[static_cast<std::size_t>(input)] != 0; }
+  /// Moments on the interval, before anything is measured behind its start. Those of measured inputs are 0.
+  double mean(int input) const noexcept { return mean_[input]; }
+  const Eigen::MatrixXd& covariance() const noexcept { return covariance_; }  ///< V
+  const Eigen::MatrixXd& with_state() const noexcept { return with_state_; }  ///< C, n x n_u
+
+  /// At the interval's end: moments of a missing input given what was measured on the way, one after the other; then
+  /// those of the state.
+  void set(int input, double mean) noexcept { mean_[input] = mean; }
+  void set_covariance(int input, int other, double value) noexcept { covariance_(input, other) = value; }
+  void set_with_state(Eigen::Index state, int input, double value) noexcept { with_state_(state, input) = value; }
+  void predicted(const Eigen::Ref<const Eigen::VectorXd>& mean,
+                 const Eigen::Ref<const Eigen::MatrixXd>& covariance) noexcept;
+  /// The state's moments after an update. With d and D by how much its mean and covariance P have changed, the inputs
+  /// move by C' P^-1 d, V by C' P^-1 D P^-1 C, and C by D P^-1 C.
+  void updated(const Eigen::Ref<const Eigen::VectorXd>& mean,
+               const Eigen::Ref<const Eigen::MatrixXd>& covariance) noexcept;
+
+  /// All that lasts from an interval to the next: `state_size` numbers.
+  std::size_t state_size() const noexcept {
+    return static_cast<std::size_t>(mean_.size() + covariance_.size() + with_state_.size());
+  }
+  void save(double* state) const noexcept;
+  void restore(const double* state) noexcept;
+
+ private:
+  void drop(Eigen::Index input) noexcept;
+  void limit(const Eigen::Ref<const Eigen::MatrixXd>& of_state) noexcept;
+
+  std::vector<double> scale_, lower_, upper_, widest_;
+  std::vector<std::uint8_t> is_missing_;
+  bool is_any_missing_ = false, is_predicted_ = false;
+  Eigen::VectorXd mean_;
+  Eigen::MatrixXd covariance_, with_state_;
+  Eigen::VectorXd state_mean_, moved_;
+  Eigen::MatrixXd state_covariance_, change_, solved_, image_, explained_, left_;
+  Eigen::LDLT<Eigen::MatrixXd> factors_, factors_of_inputs_;
+};
+
+}  // namespace rhec
