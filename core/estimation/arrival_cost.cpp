@@ -83,6 +83,7 @@ ArrivalCost::ArrivalCost(ArrivalKind kind, const RheProblem& like, std::vector<P
 void ArrivalCost::reset(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance) noexcept {
   filter_.mean = mean;
   filter_.covariance = initial_covariance_ = covariance;
+  filter_.inputs().forget();
 }
 
 /// If rounding has made the covariance singular, increases its diagonal just enough to factorise it.

@@ -104,6 +104,11 @@ void InputGuess::predicted(const Eigen::Ref<const Eigen::VectorXd>& mean,
   is_predicted_ = true;
 }
 
+void InputGuess::resume(const Eigen::Ref<const Eigen::VectorXd>& mean,
+                        const Eigen::Ref<const Eigen::MatrixXd>& covariance) noexcept {
+  if (covariance_.diagonal().maxCoeff() > 0.0) predicted(mean, covariance);
+}
+
 void InputGuess::updated(const Eigen::Ref<const Eigen::VectorXd>& mean,
                          const Eigen::Ref<const Eigen::MatrixXd>& covariance) noexcept {
   if (!is_predicted_) return;
@@ -117,7 +122,6 @@ void InputGuess::updated(const Eigen::Ref<const Eigen::VectorXd>& mean,
   with_state_ += image_;
   covariance_ += explained_;
   for (Eigen::Index j = 0; j < mean_.size(); ++j) {
-    if (!is_missing(static_cast<int>(j))) continue;
     mean_[j] += solved_.col(j).dot(moved_);
     const auto at = static_cast<std::size_t>(j);
     mean_[j] = std::min(std::max(mean_[j], lower_[at]), upper_[at]);

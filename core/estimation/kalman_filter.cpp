@@ -126,7 +126,7 @@ void KalmanFilter::update_as_expected(Measured y) noexcept {
   }
   take_outputs(y);
   mean += correction_;
-  if (guesses_inputs_) input_guess_.updated(mean, covariance);
+  input_guess_.updated(mean, covariance);
   clip();
 }
 
@@ -240,11 +240,13 @@ void KalmanFilter::make_symmetric() noexcept {
 
 /// Moments of the inputs of an interval.
 void KalmanFilter::begin_inputs(const double* measured, const double* guess, double duration) noexcept {
-  if (!guess) input_guess_.begin(measured, duration, covariance);
+  if (!guess) {
+    input_factors_.begin(measured);
+    for (int p = 0; p < np_; ++p)
+      if (input_factors_.is_held(p)) restart_parameter(p, covariance(nx_ + p, nx_ + p));
+    input_guess_.begin(measured, duration, covariance);
+  }
   guesses_inputs_ = !guess && input_guess_.is_any_missing();
-  if (guesses_inputs_) input_factors_.begin(measured);
-  for (int p = 0; guesses_inputs_ && p < np_; ++p)
-    if (input_factors_.is_held(p)) restart_parameter(p, covariance(nx_ + p, nx_ + p));
   for (int j = 0; j < nu_; ++j) {
     is_missing_[j] = std::isnan(measured[j]);
     input_[j] = measured[j];

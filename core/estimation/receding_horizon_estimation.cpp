@@ -85,7 +85,8 @@ RecedingHorizonEstimation::RecedingHorizonEstimation(std::shared_ptr<const Model
   nodes_.assign(intervals + 4,
                 Node{0.0, std::vector<double>(model_->input_count()), MeasuredOutputs(model_->output_count()),
                      BetweenNodes(model_->output_count(), setup_.problem.most_between)});
-  arrivals_.assign(3, Arrival{-1, arrival_.mean(), arrival_.covariance(), first_starts_});
+  arrivals_.assign(3, Arrival{-1, arrival_.mean(), arrival_.covariance(),
+                              std::vector<double>(arrival_.inputs().state_size()), first_starts_});
   reset();
 }
 
@@ -152,12 +153,13 @@ void RecedingHorizonEstimation::remember_arrival() noexcept {
   kept.first = window_.first;
   kept.mean = arrival_.mean();
   kept.covariance = arrival_.covariance();
+  arrival_.inputs().save(kept.inputs.data());
   kept.starts = first_starts_;
 }
 
 void RecedingHorizonEstimation::restore_arrival() noexcept {
   const Arrival& kept = arrival_at(window_.first);
-  arrival_.restore(kept.mean, kept.covariance);
+  arrival_.restore(kept.mean, kept.covariance, kept.inputs.data());
 }
 
 /// Whether outputs give other weights to squared residuals than those of a node do.

@@ -4,8 +4,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <deque>
 #include <random>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Cholesky>
@@ -30,13 +32,14 @@ struct Seen {
 };
 
 /// Forty seconds at about 3 m/s, with positions at 5 Hz and a steering angle at 20 Hz. Inputs come until `from` [s],
-/// and again from `to` on. `quiet`: nor do positions, for as long [s] from 20 s on.
-Seen drive(const Robot& vehicle, std::uint64_t seed, double from, double to, double quiet = 0.0) {
+/// and again from `to` on. `quiet`: nor do positions, for as long [s] from 20 s on. `late`: how late they come [s].
+Seen drive(const Robot& vehicle, std::uint64_t seed, double from, double to, double quiet = 0.0, double late = 0.0) {
   constexpr double wheelbase = 1.4, antenna = 0.4, tick = 0.01, settled = 5.0;
   const auto estimator = vehicle.make_estimator();
   std::mt19937_64 random(seed);
   std::normal_distribution<double> noise;
   Eigen::Vector4d truth(0.0, 0.0, 0.1, 0.0);
+  std::deque<std::pair<double, std::vector<double>>> on_the_way;
   Seen seen;
   for (int i = 0; i < 4000; ++i) {
     const double time = tick * i, speed = 3.0 + std::sin(0.3 * time), rate = 0.15 * std::cos(0.5 * time);
@@ -45,10 +48,11 @@ Seen drive(const Robot& vehicle, std::uint64_t seed, double from, double to, dou
     if (i % 5 == 1)
       estimator->push_measurement(time, std::vector<double>{nan, nan, truth[3] + 0.01 * noise(random)}.data());
     if (i % 20 == 13 && (time < 20.0 || time >= 20.0 + quiet))
-      estimator->push_measurement(
-          time, std::vector<double>{truth[0] - antenna * std::cos(truth[2]) + 0.03 * noise(random),
-                                    truth[1] - antenna * std::sin(truth[2]) + 0.03 * noise(random), nan}
-                    .data());
+      on_the_way.emplace_back(time,
+                              std::vector<double>{truth[0] - antenna * std::cos(truth[2]) + 0.03 * noise(random),
+                                                  truth[1] - antenna * std::sin(truth[2]) + 0.03 * noise(random), nan});
+    for (; !on_the_way.empty() && on_the_way.front().first + late <= time; on_the_way.pop_front())
+      estimator->push_measurement(on_the_way.front().first, on_the_way.front().second.data());
     if (i % 20 == 19) {
       const Estimate& now = estimator->estimate(time);
       seen.is_finite = seen.is_finite && now.state.allFinite() && now.covariance.allFinite();
@@ -111,6 +115,20 @@ struct SilentInputs : ::testing::TestWithParam<const char*> {
 TEST_P(SilentInputs, OfAVehicleAreWhatItsPositionsTell) { expect_found(0.0, 1e9); }
 TEST_P(SilentInputs, MayBecomeSo) { expect_found(10.0, 1e9); }
 TEST_P(SilentInputs, MayComeAgain) { expect_found(8.0, 25.0); }
+
+/// What was known of them goes back with the state.
+TEST_P(SilentInputs, AreFoundFromPositionsThatComeLate) {
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+    SCOPED_TRACE(seed);
+    const Seen seen = drive(vehicle, seed, 10.0, 1e9, 0.0, 0.5);
+    ASSERT_TRUE(seen.is_finite);
+    EXPECT_TRUE(seen.has_covariances);
+    EXPECT_EQ(seen.lost, 0);
+    EXPECT_LT(seen.errors[seen.errors.size() / 2], 0.25);
+    EXPECT_LT(seen.errors.back(), 1.2);
+    EXPECT_GT(seen.honest, 0.9 * seen.samples);
+  }
+}
 
 /// An error of the last speed that was found adds up.
 TEST_P(SilentInputs, WithoutPositionsLetTheVehicleBeAnywhere) {

@@ -38,11 +38,14 @@ class RHEC_EXPORT ArrivalCost {
 
   ArrivalKind kind() const noexcept { return kind_; }
   void reset(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance) noexcept;
-  /// Back to what `mean` and `covariance` were.
-  void restore(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance) noexcept {
+  /// Back to what `mean`, `covariance` and `inputs` were, the latter as saved.
+  void restore(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance, const double* inputs) noexcept {
     filter_.mean = mean;
     filter_.covariance = covariance;
+    filter_.inputs().restore(inputs);
+    filter_.inputs().resume(mean, covariance);
   }
+  const InputGuess& inputs() const noexcept { return filter_.inputs(); }
   const Eigen::VectorXd& mean() const noexcept { return filter_.mean; }
   const Eigen::MatrixXd& covariance() const noexcept { return filter_.covariance; }
 

@@ -52,6 +52,9 @@ class RHEC_EXPORT InputGuess {
   }
   void save(double* state) const noexcept;
   void restore(const double* state) noexcept;
+  /// After `restore` of what was saved behind `predicted`, with the moments that it was given.
+  void resume(const Eigen::Ref<const Eigen::VectorXd>& mean,
+              const Eigen::Ref<const Eigen::MatrixXd>& covariance) noexcept;
 
  private:
   void drop(Eigen::Index input) noexcept;

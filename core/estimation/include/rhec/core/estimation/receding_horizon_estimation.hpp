@@ -86,6 +86,7 @@ class RHEC_EXPORT RecedingHorizonEstimation final : public WindowedEstimation {
     std::int64_t first = -1;
     Eigen::VectorXd mean;
     Eigen::MatrixXd covariance;
+    std::vector<double> inputs;  ///< of InputGuess
     std::vector<std::int64_t> starts;
   };
   Node& node(std::int64_t number) noexcept { return nodes_[static_cast<std::size_t>(number) % nodes_.size()]; }
