@@ -11,6 +11,7 @@
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/base/padded.hpp"
 #include "rhec/core/base/scratch.hpp"
+#include "rhec/core/model/dense_rows.hpp"
 
 namespace rhec {
 namespace {
@@ -267,25 +268,8 @@ void InputRateModel::integrate(const Intervals& request) const noexcept {
 }
 
 void InputRateModel::observe(const Nodes& request) const noexcept {
-  const int nx = vehicle_->state_count(), nc = static_cast<int>(rated_.size()), ny = output_count(), wide = nx + nc;
   std::array<double, std::size_t{widest} * widest> dense;
-  for (std::ptrdiff_t i = 0; i < request.count; ++i) {
-    Nodes one{.count = 1, .states = request.states + i * wide};
-    if (request.outputs) one.outputs = request.outputs + i * ny;
-    if (request.jacobians) {
-      one.jacobians = request.jacobians + i * ny * wide;
-      std::fill_n(one.jacobians + ny * nx, ny * nc, 0.0);
-    }
-    if (request.hessians) {
-      one.multipliers = request.multipliers + i * ny;
-      one.hessians = dense.data();
-    }
-    vehicle_->observe(one);
-    if (!request.hessians) continue;
-    double* const H = request.hessians + i * wide * wide;
-    std::fill_n(H, wide * wide, 0.0);
-    for (int c = 0; c < nx; ++c) std::copy_n(dense.data() + c * nx, nx, H + c * wide);
-  }
+  observe_first_states(*vehicle_, static_cast<int>(rated_.size()), request, dense.data());
 }
 
 void InputRateModel::rates(const double* x, const double* u, const double* p, double* dxdt) const noexcept {

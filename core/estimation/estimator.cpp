@@ -294,13 +294,13 @@ void Estimator::push_input(double time, const double* inputs) noexcept {
   }
   if (!std::isfinite(time)) return;
   if (watch_) hold_missing_inputs(time);
-  if (watch_) grid_.hold_inputs(longest_silence(inputs_source()));
+  if (watch_) grid_.hold_inputs(input_hold());
   grid_.push_input(time, values_.data());
 }
 
 /// What is missing of a message of inputs holds for as long as it would if no message came.
 void Estimator::hold_missing_inputs(double time) noexcept {
-  const double longest = longest_silence(inputs_source());
+  const double longest = input_hold();
   for (std::size_t j = 0; j < measured_inputs_; ++j) {
     HeldInput& held = held_inputs_[j];
     const double age = time - held.time;
@@ -480,6 +480,14 @@ double Estimator::longest_silence(int source) const noexcept {
   constexpr double least_silence = 1.0, usual_intervals = 5.0, slow = 1.0;
   if (!clocks_->knows_interval(source)) return usual_intervals * slow;
   return std::max(least_silence, usual_intervals * clocks_->usual_interval(source));
+}
+
+/// Until the next one is missed: what an input does where nobody says so may be more than all sensors are believed.
+double Estimator::input_hold() const noexcept {
+  constexpr double late_inputs = 0.5;
+  if (!clocks_->knows_interval(inputs_source())) return longest_silence(inputs_source());
+  const double interval = clocks_->usual_interval(inputs_source());
+  return std::max(ages_[static_cast<std::size_t>(inputs_source())].usual, interval) + late_inputs * interval;
 }
 
 /// Goes through a time in equal parts. Once the deadline has passed, the rest has only few.

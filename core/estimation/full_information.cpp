@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "block_structure.hpp"
+#include "input_walks.hpp"
 #include "node_log.hpp"
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/estimation/measurement.hpp"
@@ -30,14 +31,14 @@ namespace {
 
 /// The estimates in the log as an iterate; a block gets the value of its last interval, which is based on most of its
 /// data.
-Iterate guess_from(const NodeLog& log, const RheProblem& problem) {
-  const int nx = problem.model().state_count(), np = problem.model().parameter_count(), N = log.intervals();
+Iterate guess_from(const NodeLog& log, const Model& vehicle, InputWalks& walks, RheProblem& problem) {
+  const int nx = vehicle.state_count(), nu = vehicle.input_count(), np = vehicle.parameter_count(), N = log.intervals();
   Iterate guess(problem.capacity());
   std::vector<double> states = log.states, at_nodes = log.parameters, inputs = log.inputs;
   fill_gaps(states, nx);
   fill_gaps(at_nodes, np);
   for (double& value : states) value = std::isfinite(value) ? value : 0.0;
-  for (double& value : inputs) value = std::isnan(value) ? 0.0 : value;
+  fill_columns(inputs, nu);
   std::vector<double> parameters(static_cast<std::size_t>(N) * np);
   for (int j = 0; j < np; ++j) {
     const double lower = problem.setup().parameter_lower[j], upper = problem.setup().parameter_upper[j];
@@ -45,13 +46,22 @@ Iterate guess_from(const NodeLog& log, const RheProblem& problem) {
     for (int i = N - 1; i >= 0; --i) {
       const bool ends = i == N - 1 || problem.structure().starts_block(i + 1, j);
       if (ends) value = at_nodes[static_cast<std::ptrdiff_t>(i + 1) * np + j];
-      if (!std::isfinite(value)) value = problem.arrival_mean[nx + j];
+      if (!std::isfinite(value)) value = problem.arrival_mean[nx + walks.count() + j];
       parameters[static_cast<std::ptrdiff_t>(i) * np + j] = std::clamp(value, lower, upper);
     }
   }
-  align_track(problem, problem.model(), states, inputs, parameters);
-  problem.structure().set_decisions(guess, inputs.data(), parameters.data());
-  for (std::ptrdiff_t i = 0; i <= N; ++i) std::copy_n(states.data() + i * nx, nx, guess.state(static_cast<int>(i)));
+  align_track(problem, vehicle, states, inputs, parameters);
+  std::vector<double> own = inputs;
+  for (std::ptrdiff_t i = 0; i <= N; ++i) {
+    const int node = static_cast<int>(i);
+    double* const state = guess.state(node);
+    std::copy_n(states.data() + i * nx, nx, state);
+    walks.write_kept(inputs, node, state + nx);
+    if (i == N) break;
+    walks.to_own(node, state + nx, own.data() + i * nu);
+    walks.write(node, parameters.data() + i * np, problem.interval_data(node), problem.measured_input(node));
+  }
+  problem.structure().set_decisions(guess, own.data(), parameters.data());
   return guess;
 }
 
@@ -68,19 +78,26 @@ SmoothedRun FullInformationEstimation::estimate(NodeLog log, Clock::time_point d
   for (int j = 0; j < np; ++j)
     if (const std::string reason = setup_.blockings[j]->why_not(N); !reason.empty())
       throw Error(fmt::format("blocking of '{}': {}", model_->description().parameters[j].name, reason));
-  RheProblem problem(model_, problem_setup);
+  InputWalks walks(model_, problem_setup, log);
+  RheProblem problem(walks.model(), walks.setup(problem_setup));
   std::vector<std::int64_t> first_starts(np, 0);
   std::vector<std::uint8_t> begins(N, 0);
   set_block_structure({0, N}, setup_.blockings, setup_.walks, first_starts, begins, problem);
   fill_data(log, nu, problem);
-  ArrivalCost prior(ArrivalKind::constant, problem, setup_.walks);
+  RheProblem::Setup of_start = problem_setup;
+  of_start.max_intervals = 1;
+  RheProblem start_problem(model_, of_start);
+  ArrivalCost prior(ArrivalKind::constant, start_problem, setup_.walks);
   prior.reset(setup_.initial_mean, setup_.initial_covariance);
-  prior.write(problem);
+  prior.write(start_problem);
+  walks.add_start(start_problem.arrival_mean, start_problem.arrival_information);
+  problem.arrival_mean = start_problem.arrival_mean;
+  problem.arrival_information = start_problem.arrival_information;
   if (const std::string reason = solver_->why_not(problem); !reason.empty())
     throw Error("smoother: the solver cannot take this problem: " + reason);
   solver_->setup(problem);
 
-  Iterate iterate = guess_from(log, problem);
+  Iterate iterate = guess_from(log, *model_, walks, problem);
   SmoothedRun run;
   const auto start = Clock::now();
   run.report = solver_->solve(iterate, deadline);
@@ -94,19 +111,25 @@ SmoothedRun FullInformationEstimation::estimate(NodeLog log, Clock::time_point d
     if (i == N) break;
     run.times.push_back(run.times.back() + log.durations[i]);
     problem.structure().inputs_on(iterate, node, run.inputs.data() + i * nu);
+    walks.to_acting(iterate.state(node + 1) + nx, run.inputs.data() + i * nu);
     problem.structure().parameters_on(iterate, node, run.parameters.data() + i * np);
     for (int j = 0; j < np; ++j) {
       const bool ramp = setup_.blockings[j]->transition() == Transition::ramp;
-      run.start_parameters.push_back(ramp ? iterate.state(node)[nx + j] : run.parameters[i * np + j]);
+      run.start_parameters.push_back(ramp ? iterate.state(node)[nx + walks.count() + j] : run.parameters[i * np + j]);
     }
   }
   for (std::ptrdiff_t i = 0; i <= N; ++i) {
     const auto row = run.parameters.begin() + std::max<std::ptrdiff_t>(i - 1, 0) * np;
     run.node_parameters.insert(run.node_parameters.end(), row, row + np);
   }
-  const std::size_t n = static_cast<std::size_t>(nx) + static_cast<std::size_t>(np);
-  run.covariances.resize((static_cast<std::size_t>(N) + 1) * n * n);
-  if (!solver_->covariances(iterate, all_stages(problem), run.covariances)) run.covariances.clear();
+  const std::ptrdiff_t n = nx + np, K = walks.count(), wide = n + K;
+  std::vector<double> covariances(static_cast<std::size_t>((N + 1) * wide * wide));
+  if (!solver_->covariances(iterate, all_stages(problem), covariances)) return run;
+  const auto place = [&](std::ptrdiff_t k) { return k < nx ? k : k + K; };
+  for (std::ptrdiff_t i = 0; i <= N; ++i)
+    for (std::ptrdiff_t c = 0; c < n; ++c)
+      for (std::ptrdiff_t r = 0; r < n; ++r)
+        run.covariances.push_back(covariances[static_cast<std::size_t>((i * wide + place(c)) * wide + place(r))]);
   return run;
 }
 

@@ -12,11 +12,48 @@ namespace {
 constexpr double most_sigma = 3.0;
 // No input is more than so many of these.
 constexpr double farthest = 100.0;
+// Changes are seen over this time at least, and remembered for so long [s].
+constexpr double shortest_change = 0.15, walk_memory = 10.0;
 // So much of the inputs' variances is explained by the state where it was too much.
 constexpr double most_explained = 0.99;
 constexpr double rounding = 1e-9;
 
 }  // namespace
+
+InputWalk::InputWalk(const Variable& input) noexcept
+    : lower(std::max(input.lower, -farthest * input.scale)),
+      upper(std::min(input.upper, farthest * input.scale)),
+      widest(std::min(most_sigma * input.scale, unknown_sigma(input))),
+      start(std::min(std::max(0.0, lower), upper)),
+      least_rate_(input.scale * input.scale) {
+  forget();
+}
+
+/// A change is one over some time, so that the noise of two measurements counts for little.
+void InputWalk::see(double measured, double duration) noexcept {
+  seen_.age += duration;
+  if (std::isnan(measured) || std::isnan(seen_.value)) {
+    seen_.value = measured;
+    seen_.age = 0.0;
+    return;
+  }
+  if (seen_.age < shortest_change) return;
+  const double change = measured - seen_.value;
+  seen_.rate += std::min(seen_.age / walk_memory, 1.0) * (change * change / seen_.age - seen_.rate);
+  seen_.rate = std::max(seen_.rate, least_rate_);
+  seen_.value = measured;
+  seen_.age = 0.0;
+}
+
+double* InputWalk::save(double* state) const noexcept {
+  const double all[] = {seen_.rate, seen_.value, seen_.age};
+  return std::copy_n(all, state_size, state);
+}
+
+const double* InputWalk::restore(const double* state) noexcept {
+  seen_ = {state[0], state[1], state[2]};
+  return state + state_size;
+}
 
 InputGuess::InputGuess(std::span<const Variable> inputs, Eigen::Index states)
     : is_missing_(inputs.size(), 0),
@@ -33,12 +70,7 @@ InputGuess::InputGuess(std::span<const Variable> inputs, Eigen::Index states)
       left_(Eigen::MatrixXd::Identity(std::ssize(inputs), std::ssize(inputs))),
       factors_(state_covariance_),
       factors_of_inputs_(left_) {
-  for (const Variable& input : inputs) {
-    scale_.push_back(input.scale);
-    lower_.push_back(std::max(input.lower, -farthest * input.scale));
-    upper_.push_back(std::min(input.upper, farthest * input.scale));
-    widest_.push_back(std::min(most_sigma * input.scale, unknown_sigma(input)));
-  }
+  for (const Variable& input : inputs) walks_.emplace_back(input);
   forget();
 }
 
@@ -47,10 +79,11 @@ void InputGuess::forget() noexcept {
   std::ranges::fill(is_missing_, std::uint8_t{0});
   with_state_.setZero();
   covariance_.setZero();
-  for (std::size_t j = 0; j < scale_.size(); ++j) {
+  for (std::size_t j = 0; j < walks_.size(); ++j) {
     const auto row = static_cast<Eigen::Index>(j);
-    mean_[row] = std::min(std::max(0.0, lower_[j]), upper_[j]);
-    covariance_(row, row) = widest_[j] * widest_[j];
+    walks_[j].forget();
+    mean_[row] = walks_[j].start;
+    covariance_(row, row) = walks_[j].widest * walks_[j].widest;
   }
 }
 
@@ -63,17 +96,19 @@ void InputGuess::drop(Eigen::Index input) noexcept {
 void InputGuess::begin(const double* measured, double duration,
                        const Eigen::Ref<const Eigen::MatrixXd>& of_state) noexcept {
   is_any_missing_ = is_predicted_ = false;
-  for (std::size_t j = 0; j < scale_.size(); ++j) {
+  for (std::size_t j = 0; j < walks_.size(); ++j) {
     const auto row = static_cast<Eigen::Index>(j);
+    InputWalk& walk = walks_[j];
+    walk.see(measured[j], duration);
     is_missing_[j] = std::isnan(measured[j]) ? 1 : 0;
     if (is_missing_[j] == 0) {
-      mean_[row] = std::min(std::max(measured[j], lower_[j]), upper_[j]);
+      mean_[row] = std::min(std::max(measured[j], walk.lower), walk.upper);
       if (covariance_(row, row) > 0.0) drop(row);
       continue;
     }
     is_any_missing_ = true;
     double& variance = covariance_(row, row);
-    variance = std::max(variance, std::min(variance + scale_[j] * scale_[j] * duration, widest_[j] * widest_[j]));
+    variance = std::max(variance, std::min(variance + walk.growth(duration), walk.widest * walk.widest));
   }
   if (is_any_missing_) limit(of_state);
 }
@@ -123,8 +158,8 @@ void InputGuess::updated(const Eigen::Ref<const Eigen::VectorXd>& mean,
   covariance_ += explained_;
   for (Eigen::Index j = 0; j < mean_.size(); ++j) {
     mean_[j] += solved_.col(j).dot(moved_);
-    const auto at = static_cast<std::size_t>(j);
-    mean_[j] = std::min(std::max(mean_[j], lower_[at]), upper_[at]);
+    const InputWalk& walk = walks_[static_cast<std::size_t>(j)];
+    mean_[j] = std::min(std::max(mean_[j], walk.lower), walk.upper);
     if (!(covariance_(j, j) > 0.0)) drop(j);
   }
   // Another update may follow.
@@ -135,7 +170,8 @@ void InputGuess::updated(const Eigen::Ref<const Eigen::VectorXd>& mean,
 void InputGuess::save(double* state) const noexcept {
   state = std::copy_n(mean_.data(), mean_.size(), state);
   state = std::copy_n(covariance_.data(), covariance_.size(), state);
-  std::copy_n(with_state_.data(), with_state_.size(), state);
+  state = std::copy_n(with_state_.data(), with_state_.size(), state);
+  for (const InputWalk& walk : walks_) state = walk.save(state);
 }
 
 void InputGuess::restore(const double* state) noexcept {
@@ -147,6 +183,7 @@ void InputGuess::restore(const double* state) noexcept {
   take(mean_);
   take(covariance_);
   take(with_state_);
+  for (InputWalk& walk : walks_) state = walk.restore(state);
 }
 
 }  // namespace rhec

@@ -173,6 +173,10 @@ Passage pass(const std::shared_ptr<const Model>& model, BankEstimation::Setup se
   for (std::ptrdiff_t i = 0; i < N; ++i) {
     const bool is_searched = filters.is_searching();
     filters.add(log.interval(static_cast<int>(i), nu), log.measured(static_cast<int>(i) + 1, ny));
+    for (int j = 0; j < nu; ++j) {
+      const double measured = log.inputs[static_cast<std::size_t>(i * nu + j)];
+      passage.inputs.push_back(std::isnan(measured) && !is_searched ? filters.bank().guessed_input(j) : measured);
+    }
     passage.distances.push_back(is_searched ? std::numeric_limits<double>::quiet_NaN() : filters.bank().distance());
   }
   const auto found = filters.bank().log_likelihoods();

@@ -12,6 +12,7 @@ namespace rhec {
 /// What a bank of filters finds out on its way through a log.
 struct Passage {
   std::vector<double> distances;         ///< ground covered on each interval [m]; NaN while the heading is searched
+  std::vector<double> inputs;            ///< n_u of each interval: as measured, else as guessed; NaN as above
   std::vector<double> log_likelihoods;   ///< of its members
   std::vector<double> output_variances;  ///< at the end
 };

@@ -20,6 +20,18 @@ void fill_gaps(std::vector<double>& rows, int width) {
     if (!is_known(i)) std::copy_n(rows.begin() + (i + 1) * width, width, rows.begin() + i * width);
 }
 
+void fill_columns(std::vector<double>& rows, int width) {
+  for (int c = 0; c < width; ++c) {
+    std::vector<double> column;
+    for (std::size_t e = static_cast<std::size_t>(c); e < rows.size(); e += static_cast<std::size_t>(width))
+      column.push_back(rows[e]);
+    fill_gaps(column, 1);
+    for (std::size_t i = 0; i < column.size(); ++i)
+      rows[i * static_cast<std::size_t>(width) + static_cast<std::size_t>(c)] =
+          std::isfinite(column[i]) ? column[i] : 0.0;
+  }
+}
+
 void clean(NodeLog& log) {
   for (auto* rows : {&log.outputs, &log.inputs}) std::ranges::transform(*rows, rows->begin(), cleaned);
   for (BetweenNodes& each : log.between)

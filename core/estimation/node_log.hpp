@@ -10,6 +10,8 @@ namespace rhec {
 /// Makes rows complete: those with a value that is not finite copy the row before them (at the start: the row after
 /// them).
 void fill_gaps(std::vector<double>& rows, int width);
+/// The same column by column; one that is never known becomes 0.
+void fill_columns(std::vector<double>& rows, int width);
 
 /// What cannot be a measurement becomes missing.
 void clean(NodeLog& log);

@@ -31,6 +31,10 @@ void PriorBank::begin_inputs(const MeasuredInterval& interval) noexcept {
   }
 }
 
+double PriorBank::guessed_input(int input) const noexcept {
+  return guesses_[static_cast<std::size_t>(most_probable())].mean(input);
+}
+
 /// Leaves out what parameters do that are held.
 void PriorBank::hold_factors() noexcept {
   const std::ptrdiff_t columns = nx_ + nu_ + 2 * np_;

@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "input_walks.hpp"
 #include "law_search.hpp"
 #include "node_log.hpp"
 #include "process_problem.hpp"
@@ -24,13 +25,13 @@ struct Track {
   std::vector<double> states, inputs, parameters;
 };
 
-Track track_of(const NodeLog& log, const BankEstimation::Setup& filters, const Model& model) {
-  Track track{log.states, log.inputs, log.parameters};
+Track track_of(const NodeLog& log, const Passage& passage, const BankEstimation::Setup& filters, const Model& model) {
+  Track track{log.states, passage.inputs, log.parameters};
   const int np = model.parameter_count();
   fill_gaps(track.states, model.state_count());
   fill_gaps(track.parameters, np);
   for (double& value : track.states) value = std::isfinite(value) ? value : 0.0;
-  for (double& value : track.inputs) value = std::isnan(value) ? 0.0 : value;
+  fill_columns(track.inputs, model.input_count());
   std::vector<double> start(Prior::max_states), covariance(std::size_t{Prior::max_states} * Prior::max_states);
   for (std::size_t e = 0; e < track.parameters.size(); ++e) {
     const std::size_t j = e % static_cast<std::size_t>(np);
@@ -66,27 +67,39 @@ class LawProblem {
  public:
   LawProblem(const std::shared_ptr<const Model>& model, const PriorSmoothing::Setup& setup, const PriorCombination& law,
              const NodeLog& log)
-      : bank_(model, bank_setup(setup, law)),
-        model_(make_process_model(model, bank_)),
-        problem_(make_process_problem(model_, problem_setup(setup, log))) {
+      : vehicle_(model),
+        walks_(model, setup.problem, log),
+        bank_(model, bank_setup(setup, law)),
+        model_(make_process_model(walks_.model(), bank_)),
+        problem_(make_process_problem(model_, walks_.setup(problem_setup(setup, log)))) {
     problem_.set_intervals(log.intervals());
     fill_data(log, model->input_count(), problem_);
     AlignedDoubles start(bank_.state_size());
     bank_.reset(setup.filters.initial_state, setup.filters.initial_covariance);
     bank_.save(start.data());
-    Eigen::MatrixXd covariance = problem_.arrival_information;
-    bank_.saved_moments(start.data(), 0, problem_.arrival_mean, covariance);
-    InformationOf(covariance.rows()).find(covariance, problem_.arrival_information);
+    Eigen::Index n = model->state_count();
+    for (int j = 0; j < model->parameter_count(); ++j) n += bank_.process_states(j);
+    Eigen::VectorXd mean(n);
+    Eigen::MatrixXd covariance(n, n), information(n, n);
+    bank_.saved_moments(start.data(), 0, mean, covariance);
+    InformationOf(n).find(covariance, information);
+    walks_.add_start(mean, information);
+    problem_.arrival_mean = mean;
+    problem_.arrival_information = information;
   }
 
   const RheProblem& problem() const noexcept { return problem_; }
-  const Model& vehicle() const noexcept { return model_->vehicle(); }
+  const Model& vehicle() const noexcept { return *vehicle_; }
 
-  void set_distances(const std::vector<double>& distances) noexcept {
-    for (int i = 0; i < problem_.intervals(); ++i)
+  /// With the ground covered on each interval, and parameters as in the track where they are held.
+  void set_intervals(const std::vector<double>& distances, const Track& track) noexcept {
+    for (int i = 0; i < problem_.intervals(); ++i) {
+      walks_.write(i, track.parameters.data() + static_cast<std::ptrdiff_t>(i) * vehicle().parameter_count(),
+                   model_->vehicle_data(problem_.interval_data(i)), problem_.measured_input(i));
       for (int j = 0; j < vehicle().parameter_count(); ++j)
         bank_.write_process(0, j, {problem_.duration(i), distances[static_cast<std::size_t>(i)]},
                             model_->process_data(j, problem_.interval_data(i)));
+    }
     problem_.finish();
   }
 
@@ -98,25 +111,35 @@ class LawProblem {
       double* const state = guess.state(static_cast<int>(i));
       std::copy_n(problem_.arrival_mean.data(), problem_.arrival_mean.size(), state);
       std::copy_n(track.states.data() + i * nx, nx, state);
+      walks_.write_kept(track.inputs, static_cast<int>(i), state + nx);
       for (std::ptrdiff_t j = 0; j < np; ++j)
         state[model_->first_state(static_cast<int>(j))] = track.parameters[i * np + j];
       if (i == problem_.intervals()) break;
       double* const control = guess.control(static_cast<int>(i));
       std::copy_n(track.inputs.data() + i * nu, nu, control);
+      walks_.to_own(static_cast<int>(i), state + nx, control);
       std::fill(control + nu, control + model_->input_count(), 0.0);
     }
     return guess;
   }
 
+  /// What acts on an interval (n_u).
+  std::vector<double> inputs_on(const Iterate& iterate, int interval) const {
+    std::vector<double> inputs(iterate.control(interval), iterate.control(interval) + vehicle().input_count());
+    walks_.to_acting(iterate.state(interval + 1) + vehicle().state_count(), inputs.data());
+    return inputs;
+  }
+
   Track track_of(const Iterate& iterate) const {
-    const std::ptrdiff_t nx = vehicle().state_count(), nu = vehicle().input_count();
+    const std::ptrdiff_t nx = vehicle().state_count();
     Track track;
     for (int i = 0; i <= problem_.intervals(); ++i) {
       const double* const state = iterate.state(i);
       track.states.insert(track.states.end(), state, state + nx);
       for (int j = 0; j < vehicle().parameter_count(); ++j) track.parameters.push_back(state[model_->first_state(j)]);
-      if (i < problem_.intervals())
-        track.inputs.insert(track.inputs.end(), iterate.control(i), iterate.control(i) + nu);
+      if (i == problem_.intervals()) break;
+      const std::vector<double> inputs = inputs_on(iterate, i);
+      track.inputs.insert(track.inputs.end(), inputs.begin(), inputs.end());
     }
     return track;
   }
@@ -186,6 +209,8 @@ class LawProblem {
     return model_->process_data(parameter, problem_.interval_data(interval))[0] != 0.0;
   }
 
+  std::shared_ptr<const Model> vehicle_;
+  InputWalks walks_;
   PriorBank bank_;  ///< of this law alone: knows its processes
   std::shared_ptr<const ProcessModel> model_;
   RheProblem problem_;
@@ -235,7 +260,7 @@ class Mixture {
         sum(run_.covariances, i, covariance.data(), n * n);
       }
       if (i == N_) break;
-      sum(run_.inputs, i, iterate.control(node), nu_);
+      sum(run_.inputs, i, problem.inputs_on(iterate, node).data(), nu_);
       problem.parameters_on(iterate, node, start.data(), end.data());
       sum(run_.start_parameters, i, start.data(), np_);
       sum(run_.parameters, i, end.data(), np_);
@@ -295,9 +320,10 @@ SmoothedRun PriorSmoothing::estimate(NodeLog log, Clock::time_point deadline) co
       search_laws(model_, setup.filters, setup.priors, log, setup.most_laws, setup.least_probability);
   // Of the law that the solution follows; all problems have the same.
   setup.filters.bank.members = {laws.front().priors};
-  std::vector<double> distances = pass(model_, setup.filters, log).distances;
+  const Passage followed = pass(model_, setup.filters, log);
+  std::vector<double> distances = followed.distances;
 
-  Track track = track_of(log, setup.filters, *model_);
+  Track track = track_of(log, followed, setup.filters, *model_);
   Mixture mixture(log, *model_);
   Report report;
   double seconds = 0.0;
@@ -310,7 +336,7 @@ SmoothedRun PriorSmoothing::estimate(NodeLog log, Clock::time_point deadline) co
       align_track(problem.problem(), *model_, track.states, track.inputs, ends);
       fill_distances(track, log, setup.filters, *model_, distances);
     }
-    problem.set_distances(distances);
+    problem.set_intervals(distances, track);
     if (const std::string reason = solver_->why_not(problem.problem()); !reason.empty())
       throw Error("smoother: the solver cannot take this problem: " + reason);
     solver_->setup(problem.problem());

@@ -371,6 +371,10 @@ SensorWatch::Finding SensorWatch::judge(double time, double* outputs, const doub
     finding = search_heading(outputs);
   } else if (is_active_) {
     WalkingFilter& filter = own_->filter;
+    const bool is_open = is_unobserved_ && is_heading_open(outputs);
+    const int h = filter.model().description().roles.heading;
+    const double heading = is_open ? filter.mean()[h] : 0.0,
+                 heading_variance = is_open ? filter.covariance()(h, h) : 0.0;
     filter.expect();
     find_stuck(outputs);
     std::copy_n(outputs, raw_.size(), raw_.data());
@@ -472,6 +476,11 @@ SensorWatch::Finding SensorWatch::judge(double time, double* outputs, const doub
     // The estimator's own knowledge of the motion is wrong.
     if (is_blind_ || is_unobserved_) finding = {.rebase = true};
     is_unobserved_ = false;
+    if (is_open) {
+      // A position says nothing of a heading that is too uncertain to be linearised about.
+      filter.mean()[h] = heading;
+      filter.covariance()(h, h) = heading_variance;
+    }
     if (finding.rebase) start_search(outputs);
     if (finding.rebase) memory_->loss->follow(filter);
     // On new ground slip would not be known, either.

@@ -1,7 +1,6 @@
 #include "rhec/core/model/state_noise_model.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <utility>
@@ -16,8 +15,7 @@
 namespace rhec {
 namespace {
 
-constexpr std::size_t room = 4096;  ///< doubles on the stack
-constexpr int noisy_at_once = 8;    ///< intervals, as many as a model evaluates side by side
+constexpr int noisy_at_once = 8;  ///< intervals, as many as a model evaluates side by side
 
 /// Those of the vehicle, with its derivatives.
 std::size_t dense_size(const Model& vehicle) {
@@ -61,7 +59,8 @@ StateNoiseModel::StateNoiseModel(std::shared_ptr<const Model> vehicle, std::vect
     : vehicle_(std::move(vehicle)),
       states_(std::move(states)),
       blocked_(std::move(blocked)),
-      description_(vehicle_->description()) {
+      description_(vehicle_->description()),
+      memory_(dense_size(*vehicle_)) {
   const int nx = vehicle_->state_count();
   if (!description_.noisy_states.empty() || !description_.blocked_noises.empty())
     throw Error(fmt::format("model '{}' has process noise already; name all its states at once", description_.name));
@@ -81,7 +80,6 @@ StateNoiseModel::StateNoiseModel(std::shared_ptr<const Model> vehicle, std::vect
   for (const int j : blocked_) description_.parameters.push_back(noise_of(description_.states[j]));
   description_.noisy_states = states_;
   description_.blocked_noises = blocked_;
-  if (dense_size(*vehicle_) > room) reserve_ = std::make_unique<Reserve>(dense_size(*vehicle_));
 }
 
 void StateNoiseModel::straight_motion(double ground_speed, const double* p, double* state,
@@ -187,9 +185,7 @@ void StateNoiseModel::integrate(const Intervals& request) const noexcept {
     for (std::ptrdiff_t first = 0; first < request.count; first += noisy_at_once)
       integrate_some(request, first, std::min<std::ptrdiff_t>(noisy_at_once, request.count - first), memory);
   };
-  if (reserve_) return reserve_->lend(all);
-  std::array<double, room> memory;
-  all(memory.data());
+  memory_.lend(all);
 }
 
 void StateNoiseModel::integrate_some(const Intervals& request, std::ptrdiff_t first, std::ptrdiff_t count,

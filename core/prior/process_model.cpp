@@ -1,7 +1,6 @@
 #include "rhec/core/prior/process_model.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cstddef>
 #include <numeric>
 #include <utility>
@@ -10,12 +9,11 @@
 
 #include "rhec/core/base/assertion.hpp"
 #include "rhec/core/base/error.hpp"
+#include "rhec/core/model/dense_rows.hpp"
 #include "rhec/core/prior/prior.hpp"
 
 namespace rhec {
 namespace {
-
-constexpr std::size_t room = 4096;  ///< doubles on the stack
 
 Variable process_variable(const Variable& parameter, int k) {
   Variable variable;
@@ -40,42 +38,23 @@ Variable noise_variable(const Variable& parameter, int k) {
 
 }  // namespace
 
-/// Dense rows of the vehicle's for some intervals.
-struct ProcessModel::Rows {
-  double *x, *u, *p, *p_end, *next, *jacobians, *multipliers, *hessians;
-
-  static std::size_t size(int nx, int nu, int np) noexcept {
-    const std::size_t x = nx, z = x + nu + 2 * static_cast<std::size_t>(np);
-    return x + z + 2 * x + x * z + z * z;
-  }
-  Rows(double* memory, std::ptrdiff_t count, int nx, int nu, int np) {
-    const auto take = [&](std::ptrdiff_t size) { return std::exchange(memory, memory + count * size); };
-    const std::ptrdiff_t z = nx + nu + 2 * std::ptrdiff_t{np};
-    x = take(nx);
-    u = take(nu);
-    p = take(np);
-    p_end = take(np);
-    next = take(nx);
-    multipliers = take(nx);
-    jacobians = take(nx * z);
-    hessians = take(z * z);
-  }
-};
-
 ProcessModel::ProcessModel(std::shared_ptr<const Model> vehicle, std::vector<int> counts)
     : vehicle_(std::move(vehicle)),
       counts_(std::move(counts)),
       nx_(vehicle_->state_count()),
       nu_(vehicle_->input_count()),
       np_(vehicle_->parameter_count()),
-      description_(vehicle_->description()) {
+      vehicle_data_(vehicle_->data_count()),
+      description_(vehicle_->description()),
+      memory_(DenseRows::size(*vehicle_)) {
   if (static_cast<int>(counts_.size()) != np_)
     throw Error(fmt::format("model '{}': {} processes given; expected {}, one a parameter", description_.name,
                             counts_.size(), np_));
-  if (const std::size_t a_row = Rows::size(nx_, nu_, np_); a_row > room) reserve_ = std::make_unique<Reserve>(a_row);
-  if (vehicle_->data_count() != 0)
-    throw Error(fmt::format("model '{}' depends on data of the interval; priors of its parameters need one without",
-                            description_.name));
+  if (dynamic_cast<const PartsOfIntervals*>(vehicle_.get()))
+    throw Error(
+        fmt::format("model '{}' depends on where an interval ends; priors of its parameters need one that does "
+                    "not",
+                    description_.name));
   n_ = nx_;
   for (int j = 0; j < np_; ++j) {
     if (counts_[j] < 1 || counts_[j] > Prior::max_states)
@@ -93,6 +72,7 @@ ProcessModel::ProcessModel(std::shared_ptr<const Model> vehicle, std::vector<int
     noises_ += counts_[j];
     data_count_ += process_data_count(counts_[j]);
   }
+  data_count_ += static_cast<int>(vehicle_data_);
   description_.parameters.clear();
   description_.roles.speed_factor = -1;
 }
@@ -109,30 +89,23 @@ void ProcessModel::data_of_part(const double* data, double share, double* part) 
       to[1 + n * n + e] = share * from[1 + n * n + e];          // L
     }
   }
+  std::copy_n(vehicle_data(data), vehicle_data_, vehicle_data(part));
 }
 
 void ProcessModel::integrate(const Intervals& request) const noexcept {
   RHEC_ASSERT(request.count == 0 || (request.states && request.inputs && request.durations &&
                                      (request.data || data_count_ == 0)),  // a vehicle without parameters has none
               "where to integrate");
-  with_memory([&](double* memory) { integrate(request, memory); });
-}
-
-/// Calls `use` with memory for one row at least.
-template <class Use>
-void ProcessModel::with_memory(const Use& use) const noexcept {
-  if (reserve_) return reserve_->lend(use);
-  std::array<double, room> memory;
-  use(memory.data());
+  memory_.lend([&](double* memory) { integrate(request, memory); });
 }
 
 void ProcessModel::integrate(const Intervals& request, double* memory) const noexcept {
-  const int at_once = std::max(1, static_cast<int>(room / Rows::size(nx_, nu_, np_)));
+  const int at_once = memory_.rows();
   const int inputs = nu_ + noises_, variables = n_ + inputs;
   const std::ptrdiff_t vehicle_z = nx_ + nu_ + 2 * std::ptrdiff_t{np_};
   for (int first = 0; first < request.count; first += at_once) {
     const int count = std::min(at_once, request.count - first);
-    const Rows rows(memory, count, nx_, nu_, np_);
+    const DenseRows rows(memory, count, *vehicle_);
     for (int i = 0; i < count; ++i) {
       const double *s = request.states + static_cast<std::ptrdiff_t>(first + i) * n_,
                    *v = request.inputs + static_cast<std::ptrdiff_t>(first + i) * inputs,
@@ -140,6 +113,7 @@ void ProcessModel::integrate(const Intervals& request, double* memory) const noe
       double* next = request.next_states ? request.next_states + static_cast<std::ptrdiff_t>(first + i) * n_ : nullptr;
       std::copy_n(s, nx_, rows.x + static_cast<std::ptrdiff_t>(i) * nx_);
       std::copy_n(v, nu_, rows.u + static_cast<std::ptrdiff_t>(i) * nu_);
+      std::copy_n(vehicle_data(data), vehicle_data_, rows.data + i * vehicle_data_);
       const double* w = v + nu_;
       for (int j = 0; j < np_; ++j) {
         const int n = counts_[j];
@@ -164,6 +138,7 @@ void ProcessModel::integrate(const Intervals& request, double* memory) const noe
                          .parameters = rows.p,
                          .parameters_end = rows.p_end,
                          .durations = request.durations + first,
+                         .data = vehicle_data_ > 0 ? rows.data : nullptr,
                          .substeps = request.substeps,
                          .next_states = request.next_states ? rows.next : nullptr,
                          .jacobians = request.jacobians ? rows.jacobians : nullptr,
@@ -247,31 +222,11 @@ void ProcessModel::write_hessian(const double* vehicle, const double* data, doub
 }
 
 void ProcessModel::observe(const Nodes& request) const noexcept {
-  with_memory([&](double* memory) { observe(request, memory); });
-}
-
-void ProcessModel::observe(const Nodes& request, double* memory) const noexcept {
-  const std::ptrdiff_t ny = output_count();
-  // One node at a time in place: the vehicle's state comes first in ours.
-  for (std::ptrdiff_t i = 0; i < request.count; ++i) {
-    const double* s = request.states + i * n_;
-    double* jacobian = request.jacobians ? request.jacobians + i * ny * n_ : nullptr;
-    double* hessian = request.hessians ? request.hessians + i * n_ * n_ : nullptr;
-    vehicle_->observe({.count = 1,
-                       .states = s,
-                       .outputs = request.outputs ? request.outputs + i * ny : nullptr,
-                       .jacobians = jacobian,
-                       .multipliers = hessian ? request.multipliers + i * ny : nullptr,
-                       .hessians = hessian ? memory : nullptr});
-    if (jacobian) std::fill(jacobian + ny * nx_, jacobian + ny * n_, 0.0);
-    if (!hessian) continue;
-    std::fill_n(hessian, static_cast<std::ptrdiff_t>(n_) * n_, 0.0);
-    for (std::ptrdiff_t c = 0; c < nx_; ++c) std::copy_n(memory + c * nx_, nx_, hessian + c * n_);
-  }
+  memory_.lend([&](double* memory) { observe_first_states(*vehicle_, n_ - nx_, request, memory); });
 }
 
 void ProcessModel::rates(const double* x, const double* u, const double*, double* dxdt) const noexcept {
-  with_memory([&](double* p) {
+  memory_.lend([&](double* p) {
     for (int j = 0; j < np_; ++j) p[j] = x[first_[j]];
     vehicle_->rates(x, u, p, dxdt);
   });

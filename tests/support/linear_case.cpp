@@ -92,6 +92,20 @@ std::vector<Sample> simulate(const Model& model, int steps, bool equal_intervals
   return samples;
 }
 
+NodeLog log_of(const Model& model, const std::vector<Sample>& samples) {
+  NodeLog log;
+  for (const Sample& sample : samples) {
+    if (sample.duration > 0.0) {
+      log.durations.push_back(sample.duration);
+      log.inputs.insert(log.inputs.end(), sample.inputs.begin(), sample.inputs.end());
+    }
+    log.outputs.insert(log.outputs.end(), sample.outputs.begin(), sample.outputs.end());
+  }
+  log.states.assign(samples.size() * model.state_count(), nan);
+  log.parameters.assign(samples.size() * model.parameter_count(), nan);
+  return log;
+}
+
 ReferenceFilter::ReferenceFilter(const Model& model, Noise noise, std::vector<Change> changes)
     : model_(model), noise_(std::move(noise)), changes_(std::move(changes)) {
   mean = initial_mean(model).cast<Real>();

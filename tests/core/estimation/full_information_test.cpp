@@ -8,9 +8,14 @@
 #include <algorithm>
 #include <cstdio>
 #include <functional>
+#include <memory>
+#include <string>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "rhec/core/base/error.hpp"
+#include "rhec/core/model/formula_model.hpp"
 #include "support/error_of.hpp"
 #include "support/linear_case.hpp"
 
@@ -18,6 +23,7 @@ namespace rhec {
 namespace full_information_test {
 
 using namespace rhec::testing;
+using namespace std::string_literals;
 using ::testing::HasSubstr;
 using Matrix = ReferenceFilter::Matrix;
 using Vector = ReferenceFilter::Vector;
@@ -62,20 +68,6 @@ std::vector<Moments> rauch_tung_striebel(const Model& model, const std::vector<C
     smoothed[k].covariance += gain * (smoothed[k + 1].covariance - predicted[k].covariance) * gain.transpose();
   }
   return smoothed;
-}
-
-NodeLog log_of(const Model& model, const std::vector<Sample>& samples) {
-  NodeLog log;
-  for (const Sample& sample : samples) {
-    if (sample.duration > 0.0) {
-      log.durations.push_back(sample.duration);
-      log.inputs.insert(log.inputs.end(), sample.inputs.begin(), sample.inputs.end());
-    }
-    log.outputs.insert(log.outputs.end(), sample.outputs.begin(), sample.outputs.end());
-  }
-  log.states.assign(samples.size() * model.state_count(), nan);
-  log.parameters.assign(samples.size() * model.parameter_count(), nan);
-  return log;
 }
 
 std::shared_ptr<Solver> solver_of(const std::string& name, const std::string& options = "{}") {
@@ -145,6 +137,63 @@ TEST(FullInformation, IsTheTextbooksSmoother) {
     EXPECT_LT(worst_of(linear_model<Boat>(), {threes}, solver), 1e-8);
     EXPECT_LT(worst_of(linear_model<Boat>(), {one_value}, solver), 1e-8);
     EXPECT_LT(worst_of(linear_model<Hovercraft>(), {threes, one_value}, solver), 1e-8);
+  }
+}
+
+/// The boat with its input as a parameter, which is unblocked and walks.
+template <class Scalar>
+struct DriftingBoat {
+  static constexpr int state_count = 3, input_count = 1, parameter_count = 2, output_count = 2;
+  void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
+    const Scalar acting[] = {u[0] + p[1]};
+    Boat<Scalar>{}.dynamics(x, acting, p, dxdt);
+  }
+  void outputs(const Scalar* x, Scalar* y) const { Boat<Scalar>{}.outputs(x, y); }
+};
+
+TEST(FullInformation, TakesAnInputThatIsMissingForAParameterThatWalks) {
+  const auto boat = linear_model<Boat>();
+  ModelDescription about = boat->description();
+  about.inputs[0].scale = 0.7;
+  const auto model = std::make_shared<FormulaModel<Boat>>(Boat<double>{}, about);
+  about.parameters.push_back(about.parameters[0]);
+  const auto drifting = std::make_shared<FormulaModel<DriftingBoat>>(DriftingBoat<double>{}, about);
+  auto samples = simulate(*boat, 30, true, 7);
+  const double duration = samples[1].duration, scale = 0.7;
+  for (std::size_t k = 1; k < samples.size(); ++k) samples[k].inputs[0] = nan;
+  for (const char* solver : {"sparse_sqp", "gn_rti"}) {
+    const auto made = [&] { return solver_of(solver, solver == "gn_rti"s ? "{mode: converge}" : "{}"); };
+    const auto of_kappa = blocking("structured", "{size: 3, neighbour_sigma: 0.2}");
+    const SmoothedRun run =
+        FullInformationEstimation(model, made(), setup_of(*model, {of_kappa})).estimate(log_of(*model, samples));
+    ASSERT_EQ(run.report.status, Status::solved);
+    FullInformationEstimation::Setup setup = setup_of(
+        *drifting,
+        {of_kappa, blocking("unblocked", fmt::format("{{neighbour_sigma: {}}}", scale * std::sqrt(duration)))});
+    setup.problem.input_weights = {1e16};
+    setup.initial_mean.setZero();
+    setup.initial_mean.head(4) = initial_mean(*model);
+    setup.initial_covariance.setZero();
+    setup.initial_covariance.topLeftCorner(4, 4) = initial_covariance(*model);
+    setup.initial_covariance(4, 4) = scale * scale * (9.0 + duration);
+    auto known = samples;
+    for (std::size_t k = 1; k < samples.size(); ++k) known[k].inputs[0] = 0.0;
+    const SmoothedRun expected = FullInformationEstimation(drifting, made(), setup).estimate(log_of(*drifting, known));
+    ASSERT_EQ(expected.report.status, Status::solved);
+    ASSERT_FALSE(run.covariances.empty());
+    for (std::size_t i = 0; i < 30; ++i)
+      EXPECT_NEAR(run.inputs[i], expected.parameters[2 * i + 1], 1e-6) << solver << ' ' << i;
+    for (std::size_t i = 0; i <= 30; ++i) {
+      for (std::size_t r = 0; r < 4; ++r) {
+        const double value = r < 3 ? run.states[3 * i + r] : run.node_parameters[i],
+                     wanted = r < 3 ? expected.states[3 * i + r] : expected.node_parameters[2 * i];
+        EXPECT_NEAR(value, wanted, 1e-6) << solver << ' ' << i << ' ' << r;
+        for (std::size_t c = 0; c < 4; ++c) {
+          const double covariance = expected.covariances[i * 25 + c * 5 + r];
+          EXPECT_NEAR(run.covariances[i * 16 + c * 4 + r], covariance, 1e-6) << solver << ' ' << i;
+        }
+      }
+    }
   }
 }
 

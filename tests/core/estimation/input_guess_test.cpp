@@ -38,6 +38,35 @@ TEST_F(Inputs, WalkFromWhereTheyWereMeasured) {
   EXPECT_EQ(guess.covariance()(0, 0), 0.0);
 }
 
+/// An input that goes from one stop to the other is not known for long.
+TEST(InputWalk, WalksByWhatItWasSeenToChange) {
+  const Variable about{.name = "rate", .unit = "rad/s", .meaning = "of steering", .scale = 0.3};
+  InputWalk walk(about);
+  EXPECT_DOUBLE_EQ(walk.growth(0.2), 0.3 * 0.3 * 0.2);
+  for (int k = 0; k < 500; ++k) walk.see(k / 10 % 2 == 0 ? 0.6 : -0.6, 0.2);
+  EXPECT_NEAR(walk.growth(1.0), 1.2 * 1.2 / 2.0, 0.15) << "by 1.2 every two seconds";
+  std::vector<double> saved(InputWalk::state_size);
+  walk.save(saved.data());
+  const double busy = walk.growth(1.0);
+  // What is missing says nothing, and one value behind it neither.
+  for (int k = 0; k < 20; ++k) walk.see(nan, 0.2);
+  walk.see(100.0, 0.2);
+  EXPECT_EQ(walk.growth(1.0), busy);
+  for (int k = 0; k < 500; ++k) walk.see(100.0, 0.2);
+  EXPECT_DOUBLE_EQ(walk.growth(1.0), 0.3 * 0.3) << "never less than its typical magnitude";
+  walk.restore(saved.data());
+  EXPECT_EQ(walk.growth(1.0), busy);
+  walk.forget();
+  EXPECT_DOUBLE_EQ(walk.growth(1.0), 0.3 * 0.3);
+}
+
+TEST(InputWalk, IsNotMadeOfNoise) {
+  const Variable about{.name = "speed", .unit = "m/s", .meaning = "of the wheels", .scale = 0.5};
+  InputWalk walk(about);
+  for (int k = 0; k < 5000; ++k) walk.see(3.0 + (k % 2 == 0 ? 0.1 : -0.1), 0.01);
+  EXPECT_LT(walk.growth(1.0), 1.2 * 0.5 * 0.5);
+}
+
 /// An update of the state is one of the joint Gaussian.
 TEST_F(Inputs, LearnWithTheState) {
   const double missing[] = {nan, nan};

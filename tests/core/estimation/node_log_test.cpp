@@ -23,6 +23,12 @@ TEST(FillGaps, CopiesTheRowBeforeOrElseTheRowBehind) {
   EXPECT_TRUE(nothing.empty());
 }
 
+TEST(FillColumns, FillsEachOfThem) {
+  std::vector<double> rows{nan, 1.0, nan, 2.0, nan, nan, nan, nan, nan, 3.0, 4.0, nan};
+  fill_columns(rows, 3);
+  EXPECT_THAT(rows, ElementsAre(2.0, 1.0, 0.0, 2.0, 1.0, 0.0, 2.0, 1.0, 0.0, 3.0, 4.0, 0.0));
+}
+
 TEST(FillData, MeasuresFurtherInputsAsZero) {
   const auto model = linear_model<testing::Hovercraft>();  // two inputs, of which the log has one
   RheProblem problem(model, linear_setup(*model, 2, ArrivalKind::ekf, {}).problem);

@@ -42,7 +42,10 @@ class DenseFilter {
     inputs_ = Eigen::VectorXd::Zero(model.input_count());
     of_inputs_ = Eigen::MatrixXd::Zero(model.input_count(), model.input_count());
     with_inputs_ = Eigen::MatrixXd::Zero(n_, model.input_count());
-    for (int j = 0; j < model.input_count(); ++j) of_inputs_(j, j) = most_variance(j);
+    for (int j = 0; j < model.input_count(); ++j) {
+      of_inputs_(j, j) = most_variance(j);
+      walks_.emplace_back(model.description().inputs[j]);
+    }
     for (int j = 0; j < np_; ++j) {
       const int count = priors_[j]->state_count();
       Eigen::MatrixXd P(count, count);
@@ -54,7 +57,8 @@ class DenseFilter {
   void predict(const Sample& sample, const std::vector<double>& input_variances, bool ends_with_jump = false) {
     const int nu = model_.input_count();
     for (int j = 0; j < nu; ++j) {
-      const double scale = model_.description().inputs[j].scale, walk = scale * scale * sample.duration;
+      walks_[j].see(sample.inputs[j], sample.duration);
+      const double walk = walks_[j].growth(sample.duration);
       if (std::isnan(sample.inputs[j])) {
         of_inputs_(j, j) = std::max(of_inputs_(j, j), std::min(of_inputs_(j, j) + walk, most_variance(j)));
         continue;
@@ -171,6 +175,7 @@ class DenseFilter {
   int nx_, np_, n_ = 0;
   std::vector<int> first_;
   Eigen::VectorXd inputs_;
+  std::vector<InputWalk> walks_;
   Eigen::MatrixXd of_inputs_, with_inputs_;
 };
 

@@ -34,7 +34,8 @@ struct Moments {
   Matrix covariance;
 };
 
-/// The textbook's smoother (Rauch, Tung and Striebel 1965) on [x; z] of a linear model, in long double.
+/// The textbook's smoother (Rauch, Tung and Striebel 1965) on [x; z; v] of a linear model, in long double, where v are
+/// the inputs on the interval before, which walk where they are missing.
 class Textbook {
  public:
   Textbook(const Model& model, PriorCombination law, const std::vector<Sample>& samples)
@@ -44,6 +45,8 @@ class Textbook {
       first_.push_back(n_);
       n_ += prior->state_count();
     }
+    inputs_ = n_;
+    n_ += model.input_count();
     Moments now{Vector::Zero(n_), Matrix::Zero(n_, n_)};
     now.mean.head(nx_) = initial_mean(model).head(nx_).cast<Real>();
     now.covariance.topLeftCorner(nx_, nx_) = initial_covariance(model).topLeftCorner(nx_, nx_).cast<Real>();
@@ -54,6 +57,10 @@ class Textbook {
       law_[j]->start(mean.data(), P.data());
       now.mean.segment(first_[j], count) = mean.cast<Real>();
       now.covariance.block(first_[j], first_[j], count, count) = P.cast<Real>();
+    }
+    for (int j = 0; j < model.input_count(); ++j) {
+      walks_.emplace_back(model.description().inputs[j]);
+      now.covariance(inputs_ + j, inputs_ + j) = std::pow(Real(3) * Real(model.description().inputs[j].scale), 2);
     }
     std::vector<Moments> filtered, predicted;
     std::vector<Matrix> transitions;
@@ -96,12 +103,13 @@ class Textbook {
     }
     return result;
   }
+  Real input(int interval, int input) const { return smoothed[interval + 1].mean[inputs_ + input]; }
   Real value(int node, int parameter) const { return smoothed[node].mean[first_[parameter]]; }
 
   std::vector<Moments> smoothed;
 
  private:
-  Matrix predict(const Sample& sample, Moments& now) const {
+  Matrix predict(const Sample& sample, Moments& now) {
     const int nu = model_.input_count();
     // Linear: its Jacobians are constant, and its value at zero is the drift.
     const std::vector<double> zero(nx_ + nu + np_, 0.0);
@@ -122,9 +130,17 @@ class Textbook {
     offset.head(nx_) = drift.cast<Real>();
     Matrix of_inputs = Matrix::Zero(n_, n_);
     for (int j = 0; j < nu; ++j) {
-      const Vector by = J.col(nx_ + j).cast<Real>();
-      offset.head(nx_) += by * Real(sample.inputs[j]);
-      of_inputs.topLeftCorner(nx_, nx_) += by * by.transpose() * Real(noise.inputs[j]) * Real(noise.inputs[j]);
+      Vector by = Vector::Zero(n_);
+      by.head(nx_) = J.col(nx_ + j).cast<Real>();
+      by[inputs_ + j] = 1;
+      const bool is_missing = std::isnan(sample.inputs[j]);
+      const Real sigma = noise.inputs[j];
+      walks_[j].see(sample.inputs[j], sample.duration);
+      if (is_missing)
+        F.col(inputs_ + j) = by;
+      else
+        offset += by * Real(sample.inputs[j]);
+      of_inputs += by * by.transpose() * (is_missing ? Real(walks_[j].growth(sample.duration)) : sigma * sigma);
     }
     for (int j = 0; j < np_; ++j) {
       const int count = law_[j]->state_count(), at = first_[j];
@@ -167,32 +183,10 @@ class Textbook {
 
   const Model& model_;
   PriorCombination law_;
-  int nx_, np_, n_ = 0;
+  int nx_, np_, n_ = 0, inputs_ = 0;
   std::vector<int> first_;
+  std::vector<InputWalk> walks_;
 };
-
-/// Without missing inputs, of which a problem knows nothing at all and a filter that they are not enormous.
-std::vector<Sample> samples_of(const Model& model, int steps, bool equal_intervals, unsigned seed) {
-  auto samples = simulate(model, steps, equal_intervals, seed);
-  for (Sample& sample : samples)
-    for (double& input : sample.inputs)
-      if (std::isnan(input)) input = 0.0;
-  return samples;
-}
-
-NodeLog log_of(const Model& model, const std::vector<Sample>& samples) {
-  NodeLog log;
-  for (const Sample& sample : samples) {
-    if (sample.duration > 0.0) {
-      log.durations.push_back(sample.duration);
-      log.inputs.insert(log.inputs.end(), sample.inputs.begin(), sample.inputs.end());
-    }
-    log.outputs.insert(log.outputs.end(), sample.outputs.begin(), sample.outputs.end());
-  }
-  log.states.assign(samples.size() * model.state_count(), nan);
-  log.parameters.assign(samples.size() * model.parameter_count(), nan);
-  return log;
-}
 
 PriorSmoothing::Setup setup_for(const Model& model, std::vector<PriorCombination> priors) {
   PriorSmoothing::Setup setup;
@@ -255,7 +249,7 @@ TEST_P(OfOneLaw, IsTheTextbooksSmoother) {
   const auto model = linear_model<Hovercraft>();
   for (std::size_t k = 0; k < laws.size(); ++k) {
     for (const bool equal_intervals : {true, false}) {
-      const auto samples = samples_of(*model, 50, equal_intervals, 7 + static_cast<unsigned>(k));
+      const auto samples = simulate(*model, 50, equal_intervals, 7 + static_cast<unsigned>(k));
       const PriorSmoothing smoother(model, solver_of(GetParam()), setup_for(*model, {{laws[k][0]}, {laws[k][1]}}));
       const SmoothedRun run = smoother.estimate(log_of(*model, samples));
       ASSERT_EQ(run.report.status, Status::solved);
@@ -266,6 +260,27 @@ TEST_P(OfOneLaw, IsTheTextbooksSmoother) {
     }
   }
 }
+/// One input ends, and comes again; the other one begins late, and ends.
+TEST_P(OfOneLaw, IsTheTextbooksSmootherWhereInputsAreMissing) {
+  const auto model = linear_model<Hovercraft>();
+  for (const PriorCombination& law : linear_priors()) {
+    auto samples = simulate(*model, 60, false, 11);
+    for (int k = 1; k <= 60; ++k) {
+      if (k > 20 && k <= 40) samples[k].inputs[0] = nan;
+      if (k <= 10 || k > 45) samples[k].inputs[1] = nan;
+    }
+    PriorSmoothing::Setup setup = setup_for(*model, {{law[0]}, {law[1]}});
+    setup.problem.input_lower = {-1e3, -1e3};
+    setup.problem.input_upper = {1e3, 1e3};
+    const SmoothedRun run = PriorSmoothing(model, solver_of(GetParam()), setup).estimate(log_of(*model, samples));
+    ASSERT_EQ(run.report.status, Status::solved);
+    const Textbook textbook(*model, law, samples);
+    EXPECT_LT(deviation(run, *model, textbook, law), 1e-9);
+    for (int i = 0; i < 60; ++i)
+      for (int j = 0; j < 2; ++j)
+        EXPECT_NEAR(run.inputs[2 * i + j], static_cast<double>(textbook.input(i, j)), 1e-8) << i << ' ' << j;
+  }
+}
 INSTANTIATE_TEST_SUITE_P(Solvers, OfOneLaw, ::testing::Values("sparse_sqp", "gn_rti"));
 
 /// Of several laws the estimate is the mixture of their smoothers by their posterior probabilities.
@@ -274,7 +289,7 @@ TEST(PriorSmoothing, MixesLawsByTheirProbabilities) {
   const std::vector<std::shared_ptr<const Prior>> choices = {prior("walk", "{sigma: 0.2, along: time}"),
                                                              prior("walk", "{sigma: 0.3, along: time}"),
                                                              prior("walk", "{sigma: 40, along: time}")};
-  const auto samples = samples_of(*model, 40, false, 3);
+  const auto samples = simulate(*model, 40, false, 3);
   PriorSmoothing::Setup setup = setup_for(*model, {{choices[0], choices[1], choices[2]}});
   const SmoothedRun run = PriorSmoothing(model, solver_of("sparse_sqp"), setup).estimate(log_of(*model, samples));
   ASSERT_THAT(run.laws, SizeIs(2)) << "the third one is hardly possible";
@@ -298,9 +313,31 @@ TEST(PriorSmoothing, MixesLawsByTheirProbabilities) {
   EXPECT_THAT(PriorSmoothing(model, solver_of("sparse_sqp"), setup).estimate(log_of(*model, samples)).laws, SizeIs(1));
 }
 
+/// Of an input that is missing as well.
+TEST(PriorSmoothing, KeepsTheBoundsOfInputs) {
+  const auto model = linear_model<Boat>();
+  auto samples = simulate(*model, 40, true, 5);
+  for (int k = 15; k <= 40; ++k) samples[k].inputs[0] = nan;
+  PriorSmoothing::Setup setup = setup_for(*model, {{prior("matern", "{length: 2, along: time}")}});
+  const auto smooth = [&](const char* solver) {
+    return PriorSmoothing(model, solver_of(solver), setup).estimate(log_of(*model, samples));
+  };
+  const SmoothedRun free = smooth("sparse_sqp");
+  const auto [least, most] = std::minmax_element(free.inputs.begin(), free.inputs.end());
+  const double upper = *least + 0.7 * (*most - *least);
+  ASSERT_GT(*std::max_element(free.inputs.begin() + 20, free.inputs.end()), upper) << "the bound would not matter";
+  setup.problem.input_lower = {-infinity};
+  setup.problem.input_upper = {upper};
+  for (const char* solver : {"sparse_sqp", "gn_rti"}) {
+    const SmoothedRun run = smooth(solver);
+    ASSERT_EQ(run.report.status, Status::solved);
+    EXPECT_NEAR(*std::max_element(run.inputs.begin(), run.inputs.end()), upper, 1e-7) << solver;
+  }
+}
+
 TEST(PriorSmoothing, KeepsTheBounds) {
   const auto model = linear_model<Boat>();
-  const auto samples = samples_of(*model, 40, true, 5);
+  const auto samples = simulate(*model, 40, true, 5);
   PriorSmoothing::Setup setup = setup_for(*model, {{prior("matern", "{length: 2, along: time}")}});
   const SmoothedRun free = PriorSmoothing(model, solver_of("sparse_sqp"), setup).estimate(log_of(*model, samples));
   const double lower = 0.5 * (*std::min_element(free.node_parameters.begin(), free.node_parameters.end()) +
@@ -316,7 +353,7 @@ TEST(PriorSmoothing, KeepsTheBounds) {
 /// A measurement that is far off moves the estimate less if its loss is robust.
 TEST(PriorSmoothing, WeighsOutliersLess) {
   const auto model = linear_model<Boat>();
-  const auto samples = samples_of(*model, 40, true, 5);
+  const auto samples = simulate(*model, 40, true, 5);
   NodeLog good = log_of(*model, samples), bad = good;
   ASSERT_FALSE(std::isnan(good.outputs[2 * 20]));
   bad.outputs[2 * 20] += 30.0;
@@ -332,7 +369,7 @@ TEST(PriorSmoothing, WeighsOutliersLess) {
 
 TEST(PriorSmoothing, SurvivesALogOfNothing) {
   const auto model = linear_model<Boat>();
-  NodeLog log = log_of(*model, samples_of(*model, 10, true, 5));
+  NodeLog log = log_of(*model, simulate(*model, 10, true, 5));
   std::fill(log.outputs.begin(), log.outputs.end(), nan);
   std::fill(log.inputs.begin(), log.inputs.end(), infinity);
   const SmoothedRun run =
@@ -343,7 +380,7 @@ TEST(PriorSmoothing, SurvivesALogOfNothing) {
 
 TEST(PriorSmoothing, SaysWhatIsWrong) {
   const auto model = linear_model<Boat>();
-  const auto samples = samples_of(*model, 5, true, 1);
+  const auto samples = simulate(*model, 5, true, 1);
   const auto with = [&](const std::function<void(PriorSmoothing::Setup&)>& change, const NodeLog& log) {
     return error_of([&] {
       auto setup = setup_for(*model, {{prior("walk", "{sigma: 0.3}")}});

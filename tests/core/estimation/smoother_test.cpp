@@ -15,20 +15,6 @@ namespace smoother_test {
 
 using namespace rhec::testing;
 
-NodeLog log_of(const Model& model, const std::vector<Sample>& samples) {
-  NodeLog log;
-  for (const Sample& sample : samples) {
-    if (sample.duration > 0.0) {
-      log.durations.push_back(sample.duration);
-      log.inputs.insert(log.inputs.end(), sample.inputs.begin(), sample.inputs.end());
-    }
-    log.outputs.insert(log.outputs.end(), sample.outputs.begin(), sample.outputs.end());
-  }
-  log.states.assign(samples.size() * model.state_count(), nan);
-  log.parameters.assign(samples.size() * model.parameter_count(), nan);
-  return log;
-}
-
 TEST(NodeRecorder, RecordsWhatPassesThrough) {
   const auto model = linear_model<Trolley>();
   const auto log = std::make_shared<NodeLog>();

@@ -10,6 +10,7 @@
 
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/model/formula_model.hpp"
+#include "rhec/core/model/input_walk_model.hpp"
 #include "support/error_of.hpp"
 
 namespace rhec {
@@ -54,6 +55,8 @@ struct Rail {
   void dynamics(const Scalar*, const Scalar* u, const Scalar*, Scalar* dxdt) const { dxdt[0] = u[0]; }
   void outputs(const Scalar* x, Scalar* y) const { y[0] = x[0]; }
 };
+
+using ::testing::ElementsAre;
 
 TEST(ProcessModel, TakesAVehicleWithoutParameters) {
   ModelDescription about;
@@ -126,6 +129,44 @@ TEST_F(ProcessModelTest, MovesTheVehicleWithParametersThatMove) {
                      .durations = &duration,
                      .next_states = x});
   for (int k = 0; k < 3; ++k) EXPECT_EQ(next[k], x[k]);
+}
+
+/// The vehicle's own stand behind those of the processes.
+TEST_F(ProcessModelTest, GivesDataOfTheIntervalToTheVehicle) {
+  const ProcessModel walking(std::make_shared<InputWalkModel>(cart(), std::vector{1}), {3, 1});
+  ASSERT_EQ(walking.state_count(), n + 1);
+  ASSERT_EQ(walking.data_count(), model.data_count() + 6);
+  std::vector<double> s = numbers(3), next(n + 1), expected(n);
+  const auto v = numbers(inputs);
+  auto d = data();
+  s.push_back(0.5);  // of the input that is kept
+  for (const double z : numbers(4)) s.push_back(z);
+  auto of_plain = d;
+  d.resize(walking.data_count(), 0.0);
+  InputWalkModel::set_walking(0, 0.25, walking.vehicle_data(d.data()));
+  const double duration = 0.3;
+  std::vector<double> part(d.size(), 9.0);
+  walking.data_of_part(d.data(), 0.5, part.data());
+  EXPECT_THAT(std::vector<double>(part.end() - 6, part.end()), ElementsAre(1.0, 0.25, 0.0, 0.0, 0.0, 0.0));
+  walking.integrate({.count = 1,
+                     .states = s.data(),
+                     .inputs = v.data(),
+                     .durations = &duration,
+                     .data = d.data(),
+                     .next_states = next.data()});
+  auto state = s;
+  state.erase(state.begin() + 3);
+  auto acting = v;
+  acting[1] = 0.5 + 0.25 * v[1];
+  model.integrate({.count = 1,
+                   .states = state.data(),
+                   .inputs = acting.data(),
+                   .durations = &duration,
+                   .data = of_plain.data(),
+                   .next_states = expected.data()});
+  EXPECT_EQ(next[3], acting[1]);
+  next.erase(next.begin() + 3);
+  EXPECT_EQ(next, expected);
 }
 
 TEST_F(ProcessModelTest, HasTheDerivativesOfItsOwnResults) {
@@ -295,7 +336,7 @@ TEST(ProcessModel, RefusesWhatItCannotHold) {
   EXPECT_THAT(error_of([] { ProcessModel(cart(), {1}); }), ::testing::HasSubstr("expected 2, one a parameter"));
   EXPECT_THAT(error_of([] { ProcessModel(cart(), {1, 9}); }), ::testing::HasSubstr("expected 1 to 4"));
   const auto inner = std::make_shared<ProcessModel>(cart(), std::vector<int>{1, 1});
-  EXPECT_THAT(error_of([&] { ProcessModel(inner, {}); }), ::testing::HasSubstr("depends on data of the interval"));
+  EXPECT_THAT(error_of([&] { ProcessModel(inner, {}); }), ::testing::HasSubstr("depends on where an interval ends"));
 }
 
 }  // namespace process_model_test

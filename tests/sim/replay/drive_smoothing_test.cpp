@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include <fmt/format.h>
+
 #include "sim/support/driven_log.hpp"
 
 namespace rhec::sim {
@@ -64,6 +66,47 @@ TEST_F(DriveSmoothingTest, WhatIsStampedLateIsWhereItWasMeasured) {
     EXPECT_NEAR(found.smoothed.predictions[i].distance, right.smoothed.predictions[i].distance, 1e-3);
     // The causal ones are predicted from what was there: half a second less of what is measured.
     EXPECT_LT(found.causal.predictions[i].distance, 0.4);
+  }
+}
+
+/// Of vehicles of whose inputs nothing is known, or nothing in the middle of the drive. On the narrow figure of eight
+/// the steering goes from one stop to the other within a second.
+TEST_F(DriveSmoothingTest, WithoutInputsHindsightIsNearerToTheTruthAsWell) {
+  for (const char* name : {"figure8", "skid_steer", "tractor_trailer"}) {
+    for (const double from : {0.0, 5.0}) {
+      double causal = 0.0, smoothed = 0.0;
+      int honest = 0, samples = 0;
+      for (int seed = 1; seed <= 2; ++seed) {
+        SCOPED_TRACE(fmt::format("{}, silent from {} s on, seed {}", name, from, seed));
+        Settings settings = settings_of(name);
+        apply_assignment(settings, "estimator.name=ekf");
+        apply_assignment(settings, fmt::format("seed={}", seed));
+        apply_assignment(settings, "smoother.solver={name: gn_rti, mode: converge}");
+        const RunLog run = drive(settings, "drive.csv");
+        const ReplayScenario scenario(Host(), settings);
+        const ReplayVariant& variant = scenario.variants().front();
+        logs::Drive silent = read(variant, "drive.csv");
+        std::erase_if(silent.events, [&](const logs::DriveEvent& event) {
+          return !event.is_output && event.time >= from && (from == 0.0 || event.time < 12.0);
+        });
+        const SmoothedDriveReplay result = smooth_drive("x", variant.robot, silent, {0, 0}, scenario.simulated_start());
+        EXPECT_EQ(result.report.status, Status::solved);
+        ASSERT_EQ(result.smoothed.estimates.size(), run.samples.size());
+        for (std::size_t i = 0; i < run.samples.size(); ++i) {
+          const auto off = [&](const DriveEstimate& of) -> Eigen::VectorXd {
+            return of.values.head(2) - run.samples[i].true_state.head(2);
+          };
+          const DriveEstimate& hindsight = result.smoothed.estimates[i];
+          EXPECT_LT(off(result.causal.estimates[i]).norm(), 0.5) << run.samples[i].time;
+          causal += off(result.causal.estimates[i]).norm();
+          smoothed += off(hindsight).norm();
+          honest += (off(hindsight).array().abs() < 3.0 * hindsight.sigmas.head(2).array()).all();
+          ++samples;
+        }
+      }
+      EXPECT_LT(smoothed, 0.85 * causal) << name << ' ' << from;
+      EXPECT_GT(honest, 0.75 * samples) << name << ' ' << from;
+    }
   }
 }
 

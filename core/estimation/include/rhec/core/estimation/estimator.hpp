@@ -50,8 +50,8 @@ class RHEC_EXPORT Estimator {
   /// measurement, e.g. as its receiver states them; those that are not above 0 are as always. A measurement counts for
   /// no more than one that is a hundred times more accurate than usual, and is missing if its deviation is infinite.
   void push_measurement(double time, const double* outputs, const double* sigmas = nullptr) noexcept;
-  /// Measured u (n_u, of the vehicle alone; NaN where missing), which holds from a time [s] on. With a judge, what is
-  /// missing for up to a second, or five of the usual intervals, is what it was; without, it is not known.
+  /// Measured u (n_u, of the vehicle alone; NaN where missing), which holds from a time [s] on. With a judge, until the
+  /// next one is missed; what is missing of it is what it was for as long. Without, it holds until the next one comes.
   void push_input(double time, const double* inputs) noexcept;
 
   /// The estimate at a time [s], from all that was pushed with stamps up to it. Beyond the newest node it is integrated
@@ -120,6 +120,8 @@ class RHEC_EXPORT Estimator {
   SensorWatch::Finding start_late(double time, const MeasuredOutputs& outputs, Clock::time_point deadline) noexcept;
   int inputs_source() const noexcept { return static_cast<int>(presence_.size()); }
   double longest_silence(int source) const noexcept;
+  /// For how long a message of inputs holds where none follows [s].
+  double input_hold() const noexcept;
   void hold_missing_inputs(double time) noexcept;
   template <class Function>
   void through_motion(double from, double to, Clock::time_point deadline, const Function& advance) noexcept;

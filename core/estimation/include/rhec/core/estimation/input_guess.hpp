@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -13,10 +14,39 @@
 
 namespace rhec {
 
-/// What a filter of a state x (n) knows of inputs that are not measured. They walk: within a second by their typical
-/// magnitude, up to three times as much as that. The filter's prediction and its updates are those of the joint
-/// Gaussian of x and these inputs u, whose means, covariance V and covariance C with x are kept here. Of an input that
-/// is measured nothing of that is left: its noise is white.
+/// How an input walks that is not measured: within a second by its typical magnitude (Variable::scale), or by as much
+/// as it was seen to change in the last seconds, if that is more; up to three typical magnitudes, and between its
+/// bounds.
+class RHEC_EXPORT InputWalk {
+ public:
+  explicit InputWalk(const Variable& input) noexcept;
+  /// Its mean over an interval [s], the one behind those before; NaN if it is missing.
+  void see(double measured, double duration) noexcept;
+  /// By how much its variance grows in a duration [s].
+  double growth(double duration) const noexcept { return seen_.rate * duration; }
+  void forget() noexcept { seen_ = {least_rate_, std::numeric_limits<double>::quiet_NaN(), 0.0}; }
+
+  double lower, upper;
+  double widest;  ///< standard deviation, also that of one of which nothing is known
+  double start;   ///< mean of one of which nothing is known
+
+  /// What was seen: `state_size` numbers.
+  static constexpr std::size_t state_size = 3;
+  double* save(double* state) const noexcept;
+  const double* restore(const double* state) noexcept;
+
+ private:
+  double least_rate_;
+  struct Seen {
+    double rate;   ///< mean square of its change per second
+    double value;  ///< from which the next change is seen
+    double age;    ///< of that value [s]
+  } seen_;
+};
+
+/// What a filter of a state x (n) knows of inputs that are not measured, which walk (InputWalk). The filter's
+/// prediction and its updates are those of the joint Gaussian of x and these inputs u, whose means, covariance V and
+/// covariance C with x are kept here. Of an input that is measured nothing of that is left: its noise is white.
 ///
 /// Allocates in its constructor only.
 class RHEC_EXPORT InputGuess {
@@ -48,7 +78,8 @@ class RHEC_EXPORT InputGuess {
 
   /// All that lasts from an interval to the next: `state_size` numbers.
   std::size_t state_size() const noexcept {
-    return static_cast<std::size_t>(mean_.size() + covariance_.size() + with_state_.size());
+    return static_cast<std::size_t>(mean_.size() + covariance_.size() + with_state_.size()) +
+           InputWalk::state_size * walks_.size();
   }
   void save(double* state) const noexcept;
   void restore(const double* state) noexcept;
@@ -60,7 +91,7 @@ class RHEC_EXPORT InputGuess {
   void drop(Eigen::Index input) noexcept;
   void limit(const Eigen::Ref<const Eigen::MatrixXd>& of_state) noexcept;
 
-  std::vector<double> scale_, lower_, upper_, widest_;
+  std::vector<InputWalk> walks_;
   std::vector<std::uint8_t> is_missing_;
   bool is_any_missing_ = false, is_predicted_ = false;
   Eigen::VectorXd mean_;

@@ -46,9 +46,8 @@ class RHEC_EXPORT PriorBank {
   double robust_weight(int output) const noexcept;
   /// Time update over an interval. Of an input that is missing each member knows what it can (InputGuess).
   /// Measurements between the two nodes are each used at its own time. The noise of an input and of a process is one
-  /// value over the interval, as of a window.
-  /// `end_outputs` (n_y, NaN where missing, or null) are those of the interval's end, for `update` to use afterwards:
-  /// the interval is linearised where its outputs of motion put it, as by KalmanFilter::predict.
+  /// value over the interval, as of a window. `end_outputs` (n_y, NaN where missing, or null) are those of the
+  /// interval's end, for `update`: it is linearised where its outputs of motion put it, as by KalmanFilter::predict.
   void predict(const MeasuredInterval& interval, Measured end_outputs = nullptr) noexcept;
   void predict(const double* measured_input, double duration) noexcept { predict({duration, measured_input}); }
   /// Whether that depends on the outputs of the interval's end.
@@ -59,6 +58,7 @@ class RHEC_EXPORT PriorBank {
   int most_between() const noexcept { return setup_.most_between; }
   /// Probability of each member.
   std::span<const double> weights() const noexcept { return {weights_.data(), static_cast<std::size_t>(members_)}; }
+  double guessed_input(int input) const noexcept;  ///< the most probable member's; of a measured one, that
   /// Sum over the updates since `reset` of each member's log likelihood (less a constant common to all): weights have a
   /// floor. Neither `save` nor `restore` touches it.
   std::span<const double> log_likelihoods() const noexcept {

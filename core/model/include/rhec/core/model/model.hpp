@@ -20,7 +20,7 @@ struct Variable {
   std::string meaning;                                      ///< short description for users
   double lower = -std::numeric_limits<double>::infinity();  ///< default bound
   double upper = std::numeric_limits<double>::infinity();   ///< default bound
-  double scale = 1.0;     ///< a typical magnitude, for finite differences and random tests
+  double scale = 1.0;     ///< a typical magnitude: for finite differences, and how far a missing input walks in 1 s
   bool is_angle = false;  ///< differences are taken on the circle
   double nominal = 1.0;   ///< of a parameter: its value without slip
   bool usual = true;      ///< of an output: measured by default

@@ -3,7 +3,7 @@
 #include <memory>
 #include <vector>
 
-#include "rhec/core/base/reserve.hpp"
+#include "rhec/core/base/call_memory.hpp"
 #include "rhec/core/model/model.hpp"
 
 namespace rhec {
@@ -54,7 +54,7 @@ class RHEC_EXPORT StateNoiseModel final : public Model {
   std::shared_ptr<const Model> vehicle_;
   std::vector<int> states_, blocked_;
   ModelDescription description_;
-  std::unique_ptr<Reserve> reserve_;  ///< null where derivatives fit on the stack
+  CallMemory memory_;  ///< for derivatives
 };
 
 }  // namespace rhec

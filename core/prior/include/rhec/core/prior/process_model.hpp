@@ -3,7 +3,7 @@
 #include <memory>
 #include <vector>
 
-#include "rhec/core/base/reserve.hpp"
+#include "rhec/core/base/call_memory.hpp"
 #include "rhec/core/model/model.hpp"
 #include "rhec/core/model/parts_of_intervals.hpp"
 
@@ -34,6 +34,9 @@ class RHEC_EXPORT ProcessModel final : public Model, public PartsOfIntervals {
   /// parameter runs to its next value, 0 if it is held; F; L (column-major, n x n).
   double* process_data(int parameter, double* data) const noexcept { return data + data_first_[parameter]; }
   const double* process_data(int parameter, const double* data) const noexcept { return data + data_first_[parameter]; }
+  /// Where that of the vehicle is, if it depends on data of the interval itself.
+  double* vehicle_data(double* data) const noexcept { return data + (data_count_ - vehicle_data_); }
+  const double* vehicle_data(const double* data) const noexcept { return data + (data_count_ - vehicle_data_); }
   static constexpr int process_data_count(int states) noexcept { return 1 + 2 * states * states; }
 
   const ModelDescription& description() const noexcept override { return description_; }
@@ -48,19 +51,17 @@ class RHEC_EXPORT ProcessModel final : public Model, public PartsOfIntervals {
   bool has_second_derivatives() const noexcept override { return vehicle_->has_second_derivatives(); }
 
  private:
-  struct Rows;
-  template <class Use>
-  void with_memory(const Use& use) const noexcept;
   void integrate(const Intervals& request, double* memory) const noexcept;
-  void observe(const Nodes& request, double* memory) const noexcept;
   void write_jacobian(const double* vehicle, const double* data, double* jacobian) const noexcept;
   void write_hessian(const double* vehicle, const double* data, double* hessian) const noexcept;
 
   std::shared_ptr<const Model> vehicle_;
   std::vector<int> counts_, first_, data_first_;
-  int nx_, nu_, np_, n_, noises_ = 0, data_count_ = 0;
+  int nx_, nu_, np_;
+  std::ptrdiff_t vehicle_data_;  ///< numbers of an interval that the vehicle depends on
+  int n_, noises_ = 0, data_count_ = 0;
   ModelDescription description_;
-  std::unique_ptr<Reserve> reserve_;  ///< null where a row fits on the stack
+  CallMemory memory_;
 };
 
 }  // namespace rhec
