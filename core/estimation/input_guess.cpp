@@ -141,7 +141,7 @@ void InputGuess::predicted(const Eigen::Ref<const Eigen::VectorXd>& mean,
 
 void InputGuess::resume(const Eigen::Ref<const Eigen::VectorXd>& mean,
                         const Eigen::Ref<const Eigen::MatrixXd>& covariance) noexcept {
-  if (covariance_.diagonal().maxCoeff() > 0.0) predicted(mean, covariance);
+  if (knows_missing()) predicted(mean, covariance);
 }
 
 void InputGuess::updated(const Eigen::Ref<const Eigen::VectorXd>& mean,

@@ -620,9 +620,13 @@ void PriorBank::restore(const double* state) noexcept {
   take(covariance_);
   take(weights_);
   take(learnt_);
-  for (InputGuess& guess : guesses_) {
+  for (int m = 0; m < lanes_; ++m) {
+    InputGuess& guess = guesses_[static_cast<std::size_t>(m)];
     guess.restore(state);
     state += guess.state_size();
+    if (!guess.knows_missing()) continue;
+    view_member(m);
+    guess.resume(full_mean_, full_covariance_);
   }
   spread_variances();
 }

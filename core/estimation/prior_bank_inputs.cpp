@@ -105,7 +105,7 @@ void PriorBank::take_guesses() noexcept {
 
 /// What the outputs of the interval's end have told.
 void PriorBank::update_guesses() noexcept {
-  if (!guesses_.front().is_any_missing()) return;
+  if (!guesses_.front().is_predicted()) return;
   for (int m = 0; m < lanes_; ++m) {
     view_member(m);
     guesses_[static_cast<std::size_t>(m)].updated(full_mean_, full_covariance_);

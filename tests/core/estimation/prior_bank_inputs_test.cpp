@@ -53,5 +53,33 @@ TEST(PriorBank, GuessesInputsAsAKalmanFilterDoes) {
   }
 }
 
+/// A bank that goes back to where it had not been updated yet learns of inputs from the update as it did before.
+TEST(PriorBank, LearnsOfInputsAgainWhereItGoesBack) {
+  const auto model = linear_model<Hovercraft>();
+  PriorBank bank(model, bank_setup(*model, linear_priors()));
+  bank.reset(initial_mean(*model).head(4), initial_covariance(*model).topLeftCorner(4, 4));
+  const auto samples = simulate(*model, 20, false, 5);
+  std::vector<double> saved(bank.state_size());
+  Eigen::VectorXd mean[2];
+  Eigen::MatrixXd covariance[2];
+  const double missing[] = {nan, nan}, late[] = {nan, 0.3, nan};
+  for (int k = 1; k <= 20; ++k) {
+    bank.predict(missing, samples[k].duration);
+    bank.save(saved.data());
+    for (int pass = 0; pass < 2; ++pass) {
+      if (pass == 1) bank.restore(saved.data());
+      bank.update(samples[k].outputs.data());
+      bank.update(late);
+      std::vector<double> here(bank.state_size());
+      bank.save(here.data());
+      bank.predict(missing, 0.4);
+      bank.moments(mean[pass], covariance[pass]);
+      bank.restore(here.data());
+    }
+    ASSERT_LT(largest(mean[1] - mean[0]), 1e-12) << k;
+    ASSERT_LT(largest(covariance[1] - covariance[0]), 1e-12) << k;
+  }
+}
+
 }  // namespace prior_bank_inputs_test
 }  // namespace rhec

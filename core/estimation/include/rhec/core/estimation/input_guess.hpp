@@ -83,6 +83,10 @@ class RHEC_EXPORT InputGuess {
   }
   void save(double* state) const noexcept;
   void restore(const double* state) noexcept;
+  /// Whether there is anything known of an input that is not measured.
+  bool knows_missing() const noexcept { return covariance_.diagonal().maxCoeff() > 0.0; }
+  /// Whether an update of the state would tell of it.
+  bool is_predicted() const noexcept { return is_predicted_; }
   /// After `restore` of what was saved behind `predicted`, with the moments that it was given.
   void resume(const Eigen::Ref<const Eigen::VectorXd>& mean,
               const Eigen::Ref<const Eigen::MatrixXd>& covariance) noexcept;
