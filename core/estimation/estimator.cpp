@@ -37,6 +37,8 @@ NodeGrid::Setup grid_setup(const EstimationMethod& method, const Estimator::Time
                             timeline.tolerance, timeline.longest_interval));
   if (!(timeline.grace >= 0.0 && timeline.grace <= 1.0))
     throw Error(fmt::format("estimator: grace {} s; expected a number from 0 to 1", timeline.grace));
+  if (!(timeline.input_hold >= 0.0))
+    throw Error(fmt::format("estimator: input_hold {} s; expected 0 or more", timeline.input_hold));
   if (!timeline.delays.empty() && std::ssize(timeline.delays) != method.model().output_count())
     throw Error(fmt::format("estimator: {} delays given; expected {}, one an output, or none", timeline.delays.size(),
                             method.model().output_count()));
@@ -448,7 +450,7 @@ void Estimator::rebase(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covar
 SensorWatch::Finding Estimator::judge(double time, MeasuredOutputs& outputs, Clock::time_point deadline) noexcept {
   const double last = watched_;
   watched_ = time;
-  const double longest = longest_silence(inputs_source());
+  const double longest = std::max(longest_silence(inputs_source()), timeline_.input_hold);
   const bool is_unknown = time - last > longest && time - clocks_->newest(inputs_source()) > longest;
   if (has_started())
     through_motion(last, time, deadline, [&](double begin, double end) {
@@ -485,9 +487,10 @@ double Estimator::longest_silence(int source) const noexcept {
 /// Until the next one is missed: what an input does where nobody says so may be more than all sensors are believed.
 double Estimator::input_hold() const noexcept {
   constexpr double late_inputs = 0.5;
-  if (!clocks_->knows_interval(inputs_source())) return longest_silence(inputs_source());
-  const double interval = clocks_->usual_interval(inputs_source());
-  return std::max(ages_[static_cast<std::size_t>(inputs_source())].usual, interval) + late_inputs * interval;
+  const double interval = clocks_->usual_interval(inputs_source()),
+               usual = std::max(ages_[static_cast<std::size_t>(inputs_source())].usual, interval);
+  return std::max(timeline_.input_hold, clocks_->knows_interval(inputs_source()) ? usual + late_inputs * interval
+                                                                                 : longest_silence(inputs_source()));
 }
 
 /// Goes through a time in equal parts. Once the deadline has passed, the rest has only few.
@@ -512,7 +515,8 @@ void Estimator::through_motion(double from, double to, Clock::time_point deadlin
 void Estimator::guess_input(double since, double begin, double end) noexcept {
   const std::vector<Variable>& inputs = model().description().inputs;
   std::copy_n(grid_.mean_input(begin, end), input_.size(), input_.begin());
-  const double newest_input = clocks_->newest(inputs_source()), usual = clocks_->usual_interval(inputs_source());
+  const double newest_input = clocks_->newest(inputs_source()),
+               usual = std::max(clocks_->usual_interval(inputs_source()), timeline_.input_hold);
   const auto age_at = [&](double time) {
     return std::isnan(newest_input) ? time - since : std::max(0.0, time - newest_input - usual);
   };
@@ -551,7 +555,8 @@ SensorWatch::Presence Estimator::presence(int source, double time) const noexcep
     const bool is_missed = time - clocks_->first() > longest_silence(source);
     return is_missed ? SensorWatch::Presence::silent : SensorWatch::Presence::present;
   }
-  const double beyond = time - newest - std::max(ages_[static_cast<std::size_t>(source)].usual, interval);
+  const double usual = std::max(ages_[static_cast<std::size_t>(source)].usual, interval),
+               beyond = time - newest - std::max(usual, source == inputs_source() ? timeline_.input_hold : 0.0);
   if (beyond > longest_silence(source) - interval) return SensorWatch::Presence::silent;
   return beyond > overdue * interval ? SensorWatch::Presence::overdue : SensorWatch::Presence::present;
 }

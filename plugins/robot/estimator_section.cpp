@@ -342,6 +342,7 @@ std::unique_ptr<Estimator> EstimatorSection::make(const std::optional<Eigen::Vec
   timeline.longest_interval = parts_.context->step;
   timeline.delays = delays_;
   timeline.output_sigmas = parts_.context->noise.output_sigmas;
+  timeline.input_hold = options_.health.inputs_hold;
   const EstimatorMaker& maker = makers_.named(options_.name);
   require_memory_for(maker);
   auto watch = make_watch_for(maker, with_hooks);

@@ -23,6 +23,10 @@ const OptionTable<HealthOptions>& HealthOptions::table() {
                   or_infinite(greater_than(0.0)))
           .integer("proof", &H::proof, "samples that a sensor must have jumped for before the estimate follows it",
                    between(2, 10000))
+          .number("inputs_hold", &H::inputs_hold,
+                  "time that inputs hold for at least where no others follow, as commands do that are told only when "
+                  "they change [s]; else they hold until the next ones are missed",
+                  or_infinite(at_least(0.0)))
           .number("lost_position", &H::lost_position,
                   "standard deviation of the position above which the vehicle is lost [m]",
                   or_infinite(greater_than(0.0)))

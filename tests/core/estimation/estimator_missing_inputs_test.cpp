@@ -3,7 +3,10 @@
 
 #include <cmath>
 #include <functional>
+#include <string>
 #include <vector>
+
+#include <fmt/format.h>
 
 #include "support/sensor_faults.hpp"
 
@@ -18,8 +21,8 @@ using Input = std::vector<double>;  ///< empty: no message
 /// Estimates of a drive with 5 m/s in bends, of which `spoil` changes messages of inputs, by the time since the fault
 /// began.
 std::vector<Estimate> drive(const char* estimator_name, const std::function<Input(double since, Input)>& spoil,
-                            bool has_encoder = true) {
-  const Robot robot = watched_robot(estimator_name);
+                            bool has_encoder = true, const std::string& more = "") {
+  const Robot robot = watched_robot(estimator_name, more);
   Eigen::Vector4d truth = Eigen::Vector4d::Zero();
   const auto estimator = robot.make_estimator(truth);
   std::vector<Estimate> estimates;
@@ -79,6 +82,24 @@ TEST_P(MissingInputs, WhatIsMissingHoldsUntilTheNextIsMissed) {
   const auto unknown = drive(GetParam(), [](double since, Input u) { return since >= 0.0 ? Input{u[0], nan} : u; });
   for (const Estimate& each : unknown) EXPECT_TRUE(each.state.allFinite() && each.covariance.allFinite());
   EXPECT_GT(unknown.back().covariance(3, 3), held.back().covariance(3, 3));
+}
+
+/// Commands that are told only when they change.
+TEST_P(MissingInputs, HoldForAsLongAsIsSaid) {
+  const auto constant = [](double since, Input u) { return since < 0.0 ? u : Input{5.0, 0.02}; };
+  const auto told = drive(GetParam(), constant);
+  for (const char* hold : {"5", ".inf"}) {
+    const auto once = drive(
+        GetParam(), [&](double since, Input u) { return since > 0.05 && since < 4.0 ? Input{} : constant(since, u); },
+        true, fmt::format("  health: {{inputs_hold: {}}}\n", hold));
+    // As often as they are asked for: an estimate between nodes is predicted with the input that holds.
+    ASSERT_EQ(once.size(), told.size());
+    for (std::size_t k = 0; k < told.size(); ++k) {
+      EXPECT_LT((once[k].state - told[k].state).norm(), 1e-9) << hold << ' ' << k;
+      EXPECT_LT((once[k].covariance - told[k].covariance).norm(), 1e-9) << hold << ' ' << k;
+      EXPECT_EQ(once[k].health.level, told[k].health.level) << hold << ' ' << k;
+    }
+  }
 }
 
 TEST_P(MissingInputs, AreNamed) {

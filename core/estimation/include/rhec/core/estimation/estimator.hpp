@@ -38,6 +38,9 @@ class RHEC_EXPORT Estimator {
     /// For so long a call whose deadline has passed goes on with what waits, beside one row and one node [s]: an
     /// estimator that is always late keeps up.
     double grace = 5e-4;
+    /// With a judge, an input holds for so long at least where no other one follows [s], as commands do that are told
+    /// only when they change; may be infinite.
+    double input_hold = 0.0;
   };
   explicit Estimator(std::unique_ptr<EstimationMethod> method) : Estimator(std::move(method), Timeline{}) {}
   /// Throws Error if a number of the timeline is out of range.
