@@ -36,6 +36,18 @@ TEST_F(TwoClocks, StampsInOrderStayAsTheyAre) {
   EXPECT_NEAR(clocks.usual_interval(0), 0.1, 1e-6);
 }
 
+/// Who delivers along with another whose stamp is right has a right one.
+TEST_F(TwoClocks, NobodyIsSuspectedWhoDeliversAlongWithOthers) {
+  const double end = run(100.0, 100);
+  EXPECT_TRUE(std::isnan(clocks.take(1, end + 4.0)));
+  EXPECT_TRUE(clocks.is_suspected(1));
+  EXPECT_TRUE(std::isnan(clocks.take(0, end + 4.1)));
+  EXPECT_NEAR(clocks.take(0, end + 4.2), end + 4.2, 1e-9);
+  clocks.also(1, end + 4.2);
+  EXPECT_FALSE(clocks.is_suspected(0));
+  EXPECT_FALSE(clocks.is_suspected(1));
+}
+
 TEST_F(TwoClocks, OneWrongStampChangesNothing) {
   for (const double wrong : {1e9, -1e9, 20.0, infinity, nan, 7.5}) {
     clocks.reset();

@@ -34,7 +34,10 @@ class RHEC_EXPORT Clocks {
   /// The place of a stamp on the timeline; NaN if it is refused.
   double take(int source, double stamp) noexcept;
   /// Another source has delivered with a stamp whose place on the timeline is known.
-  void also(int source, double time) noexcept { use(sources_[source], time); }
+  void also(int source, double time) noexcept {
+    sources_[source].suspects = sources_[source].steps = 0;
+    use(sources_[source], time);
+  }
   /// The place of a time that somebody asks for, by the clock that fits best; NaN if it is not finite. Nothing changes.
   double place_of(double time) const noexcept { return time - offset_of(time); }
   /// What to subtract from a time that somebody asks for: the offset of the source that brings it closest to now.
