@@ -11,8 +11,8 @@
 
 #include <fmt/format.h>
 
+#include "rhec/core/base/call_memory.hpp"
 #include "rhec/core/base/error.hpp"
-#include "rhec/core/base/reserve.hpp"
 #include "rhec/core/model/formula_copy.hpp"
 
 namespace rhec {
@@ -22,14 +22,14 @@ namespace {
 class ChosenOutputs final : public Model {
  public:
   ChosenOutputs(std::shared_ptr<Model> model, std::vector<int> chosen, const std::vector<std::string>& names)
-      : model_(std::move(model)), chosen_(std::move(chosen)), description_(model_->description()) {
-    all_ = model_->output_count();
-    const std::size_t a_node = static_cast<std::size_t>(all_) * (static_cast<std::size_t>(model_->state_count()) + 2);
+      : model_(std::move(model)),
+        chosen_(std::move(chosen)),
+        description_(model_->description()),
+        all_(model_->output_count()),
+        memory_(static_cast<std::size_t>(all_) * (static_cast<std::size_t>(model_->state_count()) + 2)) {
     if (chosen_.size() > room)
       throw Error(
           fmt::format("model '{}': {} outputs chosen; expected at most {}", description_.name, chosen_.size(), room));
-    if (a_node > room) reserve_ = std::make_unique<Reserve>(a_node);
-    nodes_at_once_ = static_cast<int>(std::max<std::size_t>(room / std::max<std::size_t>(a_node, 1), 1));
     description_.outputs.clear();
     for (std::size_t j = 0; j < chosen_.size(); ++j) {
       description_.outputs.push_back(model_->description().outputs[chosen_[j]]);
@@ -63,22 +63,21 @@ class ChosenOutputs final : public Model {
   const VehicleGraph* graph() const noexcept override { return graph_ ? &*graph_ : nullptr; }
 
   void observe(const Nodes& request) const noexcept override {
-    if (reserve_) return reserve_->lend([&](double* memory) { observe_of_all(request, memory); });
-    std::array<double, room> memory;
-    observe_of_all(request, memory.data());
+    memory_.lend([&](double* memory) { observe_of_all(request, memory); });
   }
 
  private:
-  static constexpr std::size_t room = 4096;  ///< doubles on the stack
+  static constexpr std::size_t room = 4096;  ///< indices on the stack
 
   /// With all outputs, their derivatives and their multipliers in memory, for some nodes at a time.
   void observe_of_all(const Nodes& request, double* memory) const noexcept {
     const std::ptrdiff_t nx = state_count(), ny = output_count();
+    const int nodes_at_once = memory_.rows();
     double* const outputs = memory;
-    double* const jacobians = outputs + static_cast<std::ptrdiff_t>(nodes_at_once_) * all_;
-    double* const multipliers = jacobians + nodes_at_once_ * all_ * nx;
-    for (int first = 0; first < request.count; first += nodes_at_once_) {
-      const int count = std::min(nodes_at_once_, request.count - first);
+    double* const jacobians = outputs + static_cast<std::ptrdiff_t>(nodes_at_once) * all_;
+    double* const multipliers = jacobians + nodes_at_once * all_ * nx;
+    for (int first = 0; first < request.count; first += nodes_at_once) {
+      const int count = std::min(nodes_at_once, request.count - first);
       Nodes part;
       part.count = count;
       part.states = request.states + first * nx;
@@ -134,8 +133,8 @@ class ChosenOutputs final : public Model {
   std::vector<int> chosen_;
   ModelDescription description_;
   std::optional<VehicleGraph> graph_;
-  int all_ = 0, nodes_at_once_ = 1;
-  std::unique_ptr<Reserve> reserve_;  ///< null where a node fits on the stack
+  int all_;
+  CallMemory memory_;
 };
 
 }  // namespace
