@@ -295,8 +295,10 @@ void Estimator::push_input(double time, const double* inputs) noexcept {
     time = place_on_timeline(time, inputs_source());
   }
   if (!std::isfinite(time)) return;
-  if (watch_) hold_missing_inputs(time);
-  if (watch_) grid_.hold_inputs(input_hold());
+  if (watch_) {
+    hold_missing_inputs(time);
+    grid_.hold_inputs(input_hold());
+  }
   grid_.push_input(time, values_.data());
 }
 

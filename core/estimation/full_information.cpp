@@ -31,7 +31,7 @@ namespace {
 
 /// The estimates in the log as an iterate; a block gets the value of its last interval, which is based on most of its
 /// data.
-Iterate guess_from(const NodeLog& log, const Model& vehicle, InputWalks& walks, RheProblem& problem) {
+Iterate guess_from(const NodeLog& log, const Model& vehicle, const InputWalks& walks, const RheProblem& problem) {
   const int nx = vehicle.state_count(), nu = vehicle.input_count(), np = vehicle.parameter_count(), N = log.intervals();
   Iterate guess(problem.capacity());
   std::vector<double> states = log.states, at_nodes = log.parameters, inputs = log.inputs;
@@ -59,7 +59,6 @@ Iterate guess_from(const NodeLog& log, const Model& vehicle, InputWalks& walks, 
     walks.write_kept(inputs, node, state + nx);
     if (i == N) break;
     walks.to_own(node, state + nx, own.data() + i * nu);
-    walks.write(node, parameters.data() + i * np, problem.interval_data(node), problem.measured_input(node));
   }
   problem.structure().set_decisions(guess, own.data(), parameters.data());
   return guess;
@@ -84,6 +83,7 @@ SmoothedRun FullInformationEstimation::estimate(NodeLog log, Clock::time_point d
   std::vector<std::uint8_t> begins(N, 0);
   set_block_structure({0, N}, setup_.blockings, setup_.walks, first_starts, begins, problem);
   fill_data(log, nu, problem);
+  // An arrival cost filters with the vehicle itself.
   RheProblem::Setup of_start = problem_setup;
   of_start.max_intervals = 1;
   RheProblem start_problem(model_, of_start);
@@ -98,6 +98,11 @@ SmoothedRun FullInformationEstimation::estimate(NodeLog log, Clock::time_point d
   solver_->setup(problem);
 
   Iterate iterate = guess_from(log, *model_, walks, problem);
+  std::vector<double> held(static_cast<std::size_t>(np));
+  for (int i = 0; i < N; ++i) {
+    problem.structure().parameters_on(iterate, i, held.data());
+    walks.write(i, held.data(), problem.interval_data(i), problem.measured_input(i));
+  }
   SmoothedRun run;
   const auto start = Clock::now();
   run.report = solver_->solve(iterate, deadline);

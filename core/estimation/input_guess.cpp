@@ -29,8 +29,10 @@ InputWalk::InputWalk(const Variable& input) noexcept
   forget();
 }
 
-/// A change is one over some time, so that the noise of two measurements counts for little.
+/// A change is one over some time, so that the noise of two measurements counts for little. What is beyond the bounds
+/// counts as these.
 void InputWalk::see(double measured, double duration) noexcept {
+  measured = std::min(std::max(measured, lower), upper);
   seen_.age += duration;
   if (std::isnan(measured) || std::isnan(seen_.value)) {
     seen_.value = measured;

@@ -13,12 +13,12 @@ InputWalks::InputWalks(std::shared_ptr<const Model> vehicle, const RheProblem::S
     const Variable& about = vehicle_->description().inputs[static_cast<std::size_t>(j)];
     const double weight = setup.input_weights[static_cast<std::size_t>(j)];
     if (!(weight > 0.0)) continue;
-    Input input{j, InputWalk(about), 1.0 / std::sqrt(weight), about.lower, about.upper, {}};
+    Input input{j, InputWalk(about), about.lower, about.upper, {}};
     bool is_any_missing = false;
     for (int i = 0; i < log.intervals(); ++i) {
       const double duration = log.durations[static_cast<std::size_t>(i)];
       input.walk.see(log.interval(i, vehicle_->input_count()).inputs[j], duration);
-      input.sigmas.push_back(std::sqrt(input.walk.growth(duration)) / input.sigma);
+      input.sigmas.push_back(std::sqrt(weight * input.walk.growth(duration)));
       if (is_missing(i, j)) {
         is_any_missing = true;
         continue;

@@ -24,6 +24,7 @@ class InputWalks {
   InputWalks(std::shared_ptr<const Model> vehicle, const RheProblem::Setup& setup, const NodeLog& log);
 
   bool is_empty() const noexcept { return inputs_.empty(); }
+  const std::shared_ptr<const Model>& vehicle() const noexcept { return vehicle_; }
   std::ptrdiff_t count() const noexcept { return std::ssize(inputs_); }
   const std::shared_ptr<const Model>& model() const noexcept { return model_; }
 
@@ -46,7 +47,6 @@ class InputWalks {
   struct Input {
     int input;
     InputWalk walk;
-    double sigma;                ///< of the model's own input
     double lower, upper;         ///< of all that is measured
     std::vector<double> sigmas;  ///< by how much it would walk on each interval, in those of the model's own input
   };

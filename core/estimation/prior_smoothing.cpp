@@ -65,20 +65,19 @@ void fill_distances(const Track& track, const NodeLog& log, const BankEstimation
 /// The problem of a whole log for one law.
 class LawProblem {
  public:
-  LawProblem(const std::shared_ptr<const Model>& model, const PriorSmoothing::Setup& setup, const PriorCombination& law,
-             const NodeLog& log)
-      : vehicle_(model),
-        walks_(model, setup.problem, log),
-        bank_(model, bank_setup(setup, law)),
+  /// Keeps a reference to `walks`, those of the log.
+  LawProblem(InputWalks& walks, const PriorSmoothing::Setup& setup, const PriorCombination& law, const NodeLog& log)
+      : walks_(walks),
+        bank_(walks_.vehicle(), bank_setup(setup, law)),
         model_(make_process_model(walks_.model(), bank_)),
         problem_(make_process_problem(model_, walks_.setup(problem_setup(setup, log)))) {
     problem_.set_intervals(log.intervals());
-    fill_data(log, model->input_count(), problem_);
+    fill_data(log, vehicle().input_count(), problem_);
     AlignedDoubles start(bank_.state_size());
     bank_.reset(setup.filters.initial_state, setup.filters.initial_covariance);
     bank_.save(start.data());
-    Eigen::Index n = model->state_count();
-    for (int j = 0; j < model->parameter_count(); ++j) n += bank_.process_states(j);
+    Eigen::Index n = vehicle().state_count();
+    for (int j = 0; j < vehicle().parameter_count(); ++j) n += bank_.process_states(j);
     Eigen::VectorXd mean(n);
     Eigen::MatrixXd covariance(n, n), information(n, n);
     bank_.saved_moments(start.data(), 0, mean, covariance);
@@ -89,7 +88,7 @@ class LawProblem {
   }
 
   const RheProblem& problem() const noexcept { return problem_; }
-  const Model& vehicle() const noexcept { return *vehicle_; }
+  const Model& vehicle() const noexcept { return *walks_.vehicle(); }
 
   /// With the ground covered on each interval, and parameters as in the track where they are held.
   void set_intervals(const std::vector<double>& distances, const Track& track) noexcept {
@@ -209,8 +208,7 @@ class LawProblem {
     return model_->process_data(parameter, problem_.interval_data(interval))[0] != 0.0;
   }
 
-  std::shared_ptr<const Model> vehicle_;
-  InputWalks walks_;
+  InputWalks& walks_;
   PriorBank bank_;  ///< of this law alone: knows its processes
   std::shared_ptr<const ProcessModel> model_;
   RheProblem problem_;
@@ -324,11 +322,12 @@ SmoothedRun PriorSmoothing::estimate(NodeLog log, Clock::time_point deadline) co
   std::vector<double> distances = followed.distances;
 
   Track track = track_of(log, followed, setup.filters, *model_);
+  InputWalks walks(model_, setup.problem, log);
   Mixture mixture(log, *model_);
   Report report;
   double seconds = 0.0;
   for (const WeighedLaws& law : laws) {
-    LawProblem problem(model_, setup, law.priors, log);
+    LawProblem problem(walks, setup, law.priors, log);
     const bool is_first = mixture.is_empty();
     if (is_first) {
       // Of an interval, what its end says.

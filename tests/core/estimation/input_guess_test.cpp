@@ -60,6 +60,17 @@ TEST(InputWalk, WalksByWhatItWasSeenToChange) {
   EXPECT_DOUBLE_EQ(walk.growth(1.0), 0.3 * 0.3);
 }
 
+TEST(InputWalk, DoesNotChangeByMoreThanItCan) {
+  const Variable about{
+      .name = "rate", .unit = "rad/s", .meaning = "of steering", .lower = -0.5, .upper = 0.5, .scale = 0.3};
+  InputWalk walk(about);
+  for (const double measured : {0.0, HUGE_VAL, -HUGE_VAL, 1e300, 0.0, 0.0}) {
+    walk.see(measured, 1.0);
+    EXPECT_LE(walk.growth(1.0), 1.0);
+  }
+  EXPECT_TRUE(std::isfinite(walk.growth(1.0)));
+}
+
 TEST(InputWalk, IsNotMadeOfNoise) {
   const Variable about{.name = "speed", .unit = "m/s", .meaning = "of the wheels", .scale = 0.5};
   InputWalk walk(about);

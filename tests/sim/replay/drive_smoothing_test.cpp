@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 
 #include <fmt/format.h>
 
@@ -105,7 +106,8 @@ TEST_F(DriveSmoothingTest, WithoutInputsHindsightIsNearerToTheTruthAsWell) {
         }
       }
       EXPECT_LT(smoothed, 0.85 * causal) << name << ' ' << from;
-      EXPECT_GT(honest, 0.75 * samples) << name << ' ' << from;
+      // Slip varies faster on the narrow figure of eight than the laws say.
+      EXPECT_GT(honest, (std::string(name) == "figure8" ? 0.8 : 0.95) * samples) << name << ' ' << from;
     }
   }
 }
