@@ -18,10 +18,13 @@ constexpr int checked_interval = 16;  // of so many, the integration of one is c
 constexpr int most_parts = 1000;      // largest number of parts of one prediction
 // Parts of the rest of a prediction whose time is up.
 constexpr int hasty_parts = 2;
-// A source is overdue this share of its usual interval after its message was to come.
-constexpr double overdue = 0.75;
-constexpr double age_memory = 5.0;  // the usual age of a source's newest message is a mean over so many
-constexpr int most_steps = 32;      // of such a part, times those of a usual one
+// A source is overdue this share of its usual interval after its message was to come, and beyond so many times what
+// messages usually are late by or early.
+constexpr double overdue = 0.75, unusually_late = 4.0;
+// The usual age of a source's newest message is a mean over so many, how much it varies over more. None counts as more
+// than so many intervals.
+constexpr double age_memory = 5.0, spread_memory = 20.0, most_late = 1.0, most_spread = 3.0;
+constexpr int most_steps = 32;  // of such a part, times those of a usual one
 // A sensor's next measurement is not before this share of its usual interval, and has come after that share, and after
 // so many times that it is usually late.
 constexpr double soonest = 0.75, latest = 1.25, latest_lag = 2.0;
@@ -113,7 +116,7 @@ Estimator::Estimator(std::unique_ptr<EstimationMethod> method, const Timeline& t
 void Estimator::clear_deliveries() noexcept {
   std::ranges::fill(deliveries_, Delivery{0.0, missing_value});
   std::ranges::fill(held_inputs_, HeldInput{missing_value, missing_value});
-  std::ranges::fill(ages_, Age{missing_value, 0.0, 0.0});
+  std::ranges::fill(ages_, Age{missing_value, 0.0, 0.0, 0.0});
   newest_row_ = ahead_ = missing_value;
   used_ = -infinity;
 }
@@ -246,8 +249,7 @@ void Estimator::note_delivery(double time, Measured outputs) noexcept {
 double Estimator::judged_until(double time) const noexcept {
   if (!watch_->is_active()) return time;
   double until = time;
-  const double now = std::max(time, newest_row_),
-               longest = longest_wait * method_->most_reach() * timeline_.longest_interval;
+  const double now = std::max(time, newest_row_);
   double quickest = infinity;
   for (std::size_t s = 0; s < deliveries_.size(); ++s)
     quickest = std::min(quickest, clocks_->usual_interval(static_cast<int>(s)));
@@ -257,22 +259,40 @@ double Estimator::judged_until(double time) const noexcept {
     // What is late by less comes before the next one of any other sensor.
     if (!(lag > std::min(least_lag * interval, 0.5 * quickest)) || std::isnan(newest)) continue;
     const double next = newest + soonest * interval, missed = newest + latest * interval + latest_lag * lag;
-    if (missed - next < longest && now < missed) until = std::min(until, next);
+    if (is_worth_waiting_for(s) && now < missed) until = std::min(until, next);
   }
   return until;
+}
+
+/// Whether a sensor's measurements come so soon that the judge can wait for them.
+bool Estimator::is_worth_waiting_for(std::size_t sensor) const noexcept {
+  const double interval = clocks_->usual_interval(static_cast<int>(sensor));
+  const double wait = (latest - soonest) * interval + latest_lag * deliveries_[sensor].lag;
+  return wait < longest_wait * method_->most_reach() * timeline_.longest_interval;
+}
+
+/// Whether a late row may begin a search of the vehicle's heading: one that is told of by the rows behind it, too.
+bool Estimator::may_begin_search(Measured outputs) const noexcept {
+  if (!watch_->is_heading_unknown()) return false;
+  for (std::size_t s = 0; s < deliveries_.size(); ++s) {
+    const auto is_measured = [&](int j) { return !std::isnan(outputs[j]); };
+    if (std::ranges::any_of(watch_->sensors()[s].outputs, is_measured) && !is_worth_waiting_for(s)) return false;
+  }
+  return true;
 }
 
 void Estimator::push(double time, Measured outputs) noexcept {
   if (!watch_) return push_judged(time, outputs);
   note_delivery(time, outputs);
-  // Before anything can be judged, what is late may say where the vehicle begins.
-  if (!has_started() || time > watched_ + timeline_.tolerance || !watch_->is_active()) {
+  // What is late may say where the vehicle begins, or begin a search of its heading.
+  const bool may_begin = !watch_->is_active() || may_begin_search(outputs);
+  if (!has_started() || time > watched_ + timeline_.tolerance || may_begin) {
     counts_.dropped += waiting_->is_full();
     waiting_->insert(time, outputs);
     return;
   }
   merged_.assign(outputs);
-  watch_->judge_late(time, merged_.values(), merged_.measured().weights);
+  watch_->judge_late(time, merged_.values(), merged_.measured().weights, false);
   push_judged(time, merged_.measured());
 }
 
@@ -381,14 +401,12 @@ bool Estimator::judge_waiting(double until, Clock::time_point deadline) noexcept
     if (is_new && is_past(deadline)) return false;
     const double time = waiting_->time(0);
     waiting_->drop_front(merge_waiting(0));
-    const bool is_late_start = has_started() && time < watched_ - timeline_.tolerance;
-    if (is_late_start && watch_->is_active()) {
-      watch_->judge_late(time, merged_.values(), merged_.measured().weights);
+    const bool is_late = has_started() && time < watched_ - timeline_.tolerance, was_active = watch_->is_active();
+    const SensorWatch::Finding finding = is_late ? judge_late(time, merged_, deadline) : judge(time, merged_, deadline);
+    if (is_late && was_active && !finding.rebase) {
       push_judged(time, merged_.measured());
       continue;
     }
-    const SensorWatch::Finding finding =
-        is_late_start ? start_late(time, merged_, deadline) : judge(time, merged_, deadline);
     push_judged(time, merged_.measured(), time <= used_ + timeline_.tolerance);
     ahead_ = missing_value;
     if (finding.release) {
@@ -400,13 +418,18 @@ bool Estimator::judge_waiting(double until, Clock::time_point deadline) noexcept
       const SensorWatch::Retraction wrong = watch_->retraction();
       grid_.retract(wrong.jumps_from, wrong.outputs_from, wrong.outputs);
     }
-    bool is_complete = true;
     if (finding.rebase && goes_ahead()) grid_.outdate(time);
-    if (finding.rebase || !watch_->is_active()) is_complete = take_in(watched_, deadline);
     if (finding.rebase) {
-      // What was measured before counts no longer.
-      if (!is_complete) grid_.skip_to(watched_);
-      rebase(watch_->mean(), watch_->covariance());
+      // A search that begins at a late measurement goes through what was judged behind it.
+      double now = is_late && was_active ? time : watched_;
+      while (!std::isnan(now)) {
+        // What was measured before counts no longer.
+        if (!take_in(now, deadline)) grid_.skip_to(now);
+        rebase(watch_->mean(), watch_->covariance());
+        now = now < watched_ ? watch_->search_on(now) : missing_value;
+      }
+    } else if (!watch_->is_active()) {
+      take_in(watched_, deadline);
     }
     // There is nothing to judge the next one by yet.
     if (!watch_->is_active() && has_waiting(last)) estimate_for_judge(deadline);
@@ -469,11 +492,13 @@ SensorWatch::Finding Estimator::judge(double time, MeasuredOutputs& outputs, Clo
   return finding;
 }
 
-/// Where a vehicle of which nothing was known begins, by a measurement that comes late.
-SensorWatch::Finding Estimator::start_late(double time, const MeasuredOutputs& outputs,
-                                           Clock::time_point deadline) noexcept {
-  const SensorWatch::Finding finding = watch_->place_start(outputs.measured().values, outputs.measured().weights);
-  if (finding.rebase)
+/// A row that comes late. Where a vehicle of which nothing was known begins by it, the judge goes on from there.
+SensorWatch::Finding Estimator::judge_late(double time, MeasuredOutputs& outputs, Clock::time_point deadline) noexcept {
+  const bool was_active = watch_->is_active();
+  const bool may_begin = !was_active || may_begin_search(outputs.measured());
+  const SensorWatch::Finding finding =
+      watch_->judge_late(time, outputs.values(), outputs.measured().weights, may_begin);
+  if (finding.rebase && !was_active)
     through_motion(time, watched_, deadline,
                    [&](double begin, double end) { watch_->advance(end - begin, grid_.mean_input(begin, end)); });
   return finding;
@@ -542,8 +567,11 @@ void Estimator::note_ages(double time) noexcept {
     Age& age = ages_[s];
     const double newest = clocks_->newest(source);
     if (std::isnan(newest)) continue;
-    if (newest > age.newest)
-      age.usual += (std::min(age.last, age.usual + clocks_->usual_interval(source)) - age.usual) / age_memory;
+    if (newest > age.newest) {
+      const double late = age.last - age.usual, interval = clocks_->usual_interval(source);
+      age.spread += (std::min(std::abs(late), most_spread * interval) - age.spread) / spread_memory;
+      age.usual += std::min(late, most_late * interval) / age_memory;
+    }
     age.newest = newest;
     age.last = std::max(0.0, time - newest);
   }
@@ -557,10 +585,12 @@ SensorWatch::Presence Estimator::presence(int source, double time) const noexcep
     const bool is_missed = time - clocks_->first() > longest_silence(source);
     return is_missed ? SensorWatch::Presence::silent : SensorWatch::Presence::present;
   }
-  const double usual = std::max(ages_[static_cast<std::size_t>(source)].usual, interval),
+  const Age& age = ages_[static_cast<std::size_t>(source)];
+  const double usual = std::max(age.usual, interval),
                beyond = time - newest - std::max(usual, source == inputs_source() ? timeline_.input_hold : 0.0);
   if (beyond > longest_silence(source) - interval) return SensorWatch::Presence::silent;
-  return beyond > overdue * interval ? SensorWatch::Presence::overdue : SensorWatch::Presence::present;
+  const double tolerance = std::max(overdue * interval, unusually_late * age.spread);
+  return beyond > tolerance ? SensorWatch::Presence::overdue : SensorWatch::Presence::present;
 }
 
 void Estimator::assess(Estimate& estimate, double time) noexcept {

@@ -31,7 +31,7 @@ SensorWatch::Finding SensorWatch::place_start(const double* outputs, const doubl
   const double most = setup_.initial_covariance.size() > 0 ? filter.covariance().diagonal().maxCoeff() : 0.0;
   if (!(most > 0.0) || roles.position_x < 0 || roles.position_y < 0) return {};
   filter.expect();
-  if (is_heading_open(outputs)) {
+  if (is_heading_open(filter, weighed(outputs))) {
     is_active_ = memory_->is_starting = true;
     const double sigma = std::sqrt(filter.covariance()(roles.heading, roles.heading));
     search_from(filter, *memory_->search, outputs, sigma < any_heading ? sigma : infinity);
@@ -58,15 +58,14 @@ SensorWatch::Finding SensorWatch::place_start(const double* outputs, const doubl
   return {.rebase = true};
 }
 
-/// Whether where the vehicle heads is not known, and of what is measured positions alone may tell.
-bool SensorWatch::is_heading_open(const double* outputs) noexcept {
-  const WalkingFilter& filter = own_->filter;
+/// Whether where the vehicle heads is not known, and of what is measured positions alone may tell, the first ones or
+/// the first behind a gap: what has come about while they were measured is for a dispute to settle.
+bool SensorWatch::is_heading_open(const WalkingFilter& filter, Measured outputs) noexcept {
   const Roles& roles = filter.model().description().roles;
-  const auto is_unknown = [&](const WalkingFilter& each) {
-    return each.covariance()(roles.heading, roles.heading) > Memory::known_heading * Memory::known_heading;
-  };
-  if (!memory_->search || !is_unknown(filter)) return false;
-  WalkingFilter& without = *memory_->trial;
+  if (!is_heading_unknown(filter)) return false;
+  for (std::size_t s = 0; s < sensors_.size() && !is_unobserved_; ++s)
+    if (is_heard(s) && sees_position(sensors_[s].outputs)) return false;
+  WalkingFilter& without = *memory_->unplaced;
   copy_numbers(filter.mean(), without.mean());
   copy_numbers(filter.covariance(), without.covariance());
   bool has_x = false, has_y = false;
@@ -78,8 +77,16 @@ bool SensorWatch::is_heading_open(const double* outputs) noexcept {
     has_y = has_y || (sees_y && !std::isnan(outputs[j]));
   }
   if (!has_x || !has_y) return false;
-  without.update(weighed(raw_.data()));
-  return is_unknown(without);
+  without.update({raw_.data(), outputs.weights});
+  return is_heading_unknown(without);
 }
+
+bool SensorWatch::is_heading_unknown(const WalkingFilter& filter) const noexcept {
+  if (!memory_->search) return false;
+  const int heading = filter.model().description().roles.heading;
+  return filter.covariance()(heading, heading) > Memory::known_heading * Memory::known_heading;
+}
+
+bool SensorWatch::is_heading_unknown() const noexcept { return is_heading_unknown(own_->filter); }
 
 }  // namespace rhec

@@ -16,8 +16,9 @@ constexpr double typical_volume_memory = 300.0;
 
 }  // namespace
 
-void SensorWatch::judge_late(double time, double* outputs, const double* weights) noexcept {
-  if (!is_active_) return;
+SensorWatch::Finding SensorWatch::judge_late(double time, double* outputs, const double* weights,
+                                             bool may_begin) noexcept {
+  if (!is_active_) return may_begin ? place_start(outputs, weights) : Finding{};
   memory_->loss->note_late(time, outputs);
   memory_->offsets->correct(outputs);
   const Memory::Entry* last = nullptr;
@@ -26,12 +27,23 @@ void SensorWatch::judge_late(double time, double* outputs, const double* weights
     const Memory::Entry& entry = memory_->entries[i];
     if (entry.time <= time && (!last || entry.time > last->time)) last = &entry;
   }
-  if (!last) return;
+  if (!last) return {};
   WalkingFilter& filter = *memory_->trial;
   filter.mean() = last->mean;
   filter.covariance() = last->covariance;
   filter.predict(last->inputs.data(), time - last->time);
   filter.expect();
+  if (may_begin && !is_searching() && is_heading_open(filter, {outputs, weights})) {
+    raw_weights_.assign(weights, weights ? weights + raw_.size() : nullptr);
+    copy_numbers(filter.mean(), memory_->before_mean);
+    copy_numbers(filter.covariance(), memory_->before_covariance);
+    const Finding finding = open_heading(time, outputs);
+    is_unobserved_ = false;
+    start_search(outputs);
+    memory_->loss->follow(own_->filter);
+    memory_->connected = 0;
+    return finding;
+  }
   for (std::size_t s = 0; s < sensors_.size(); ++s) {
     if (!filter.innovation(sensors_[s], {outputs, weights}, scratch_)) continue;
     if (scratch_.nis <= limit(s, scratch_.value.size())) {
@@ -44,6 +56,21 @@ void SensorWatch::judge_late(double time, double* outputs, const double* weights
     quiet_[s] = 0;
     for (const int j : sensors_[s].outputs) outputs[j] = Memory::unknown;
   }
+  return {};
+}
+
+double SensorWatch::search_on(double time) noexcept {
+  Memory& memory = *memory_;
+  if (!is_searching()) return Memory::unknown;
+  const auto known = static_cast<int>(std::min<std::int64_t>(memory.count, Memory::remembered_samples));
+  int ago = 0;
+  while (ago < known && memory.entry(ago).time > time) ++ago;
+  if (ago == 0 || ago == known) return Memory::unknown;
+  const Memory::Entry &from = memory.entry(ago), &next = memory.entry(ago - 1);
+  memory.search->predict(from.inputs.data(), next.time - std::max(from.time, time));
+  memory.search->update(sensors_, next.outputs.measured());
+  memory.search->moments(own_->filter.mean(), own_->filter.covariance());
+  return next.time;
 }
 
 void SensorWatch::begin_ahead() noexcept {

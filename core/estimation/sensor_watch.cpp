@@ -163,6 +163,7 @@ SensorWatch::SensorWatch(std::shared_ptr<const Model> model, const Setup& setup)
   memory_->stuck = StuckValues(setup_.noise.output_variances);
   memory_->trial = std::make_unique<WalkingFilter>(model, filter_setup(setup_));
   memory_->ahead = std::make_unique<WalkingFilter>(model, filter_setup(setup_));
+  memory_->unplaced = std::make_unique<WalkingFilter>(model, filter_setup(setup_));
   memory_->loss = std::make_unique<InformationLoss>(model, filter_setup(setup_));
   own_->filter.expect();
   std::vector<OffsetWatch::Watched> watched;
@@ -357,6 +358,121 @@ void SensorWatch::note_sample(double time, const double* outputs) noexcept {
   memory_->is_counted = is_position || !has_position;
 }
 
+/// Each sensor by what the estimate expects of it; what does not pass is not used, and disputed.
+SensorWatch::Finding SensorWatch::judge_each(double time, double* outputs) noexcept {
+  WalkingFilter& filter = own_->filter;
+  const int counted = memory_->is_counted;
+  Finding finding;
+  bool is_disputed = false, is_any_measured = false, is_placed = false, is_back = true;
+  for (std::size_t s = 0; s < sensors_.size(); ++s) {
+    const bool has_room = innovation_count_ < static_cast<int>(innovations_.size());
+    Innovation& innovation = has_room ? innovations_[innovation_count_] : scratch_;
+    if (!filter.innovation(sensors_[s], weighed(outputs), innovation)) continue;
+    memory_->offsets->widen(filter, sensors_[s], outputs, innovation);
+    innovation_count_ += has_room;
+    is_any_measured = true;
+    innovation.time = time;
+    innovation.sensor = static_cast<int>(s);
+    innovation.accepted = admits(s, innovation);
+    heard_[s] = time;
+    if (innovation.accepted) {
+      ++states_[s].accepted;
+      if (setup_.whiteness) memory_->whiteness[s].take(innovation, sensors_[s].outputs.size());
+      is_placed = is_placed || sees_position(sensors_[s].outputs);
+      continue;
+    }
+    is_disputed = true;
+    is_back = is_back && records_[s].after_gap && records_[s].failures == 1;
+    findings_[s] |= reason::rejected;
+    ++states_[s].rejected;
+    for (const int j : sensors_[s].outputs) outputs[j] = Memory::unknown;
+  }
+  if (is_blind_) test_inputs(raw_.data());
+  unplaced_samples_ = is_placed ? 0 : unplaced_samples_ + is_disputed;
+  const int told = is_disputed ? offset_in_dispute() : -1;
+  if (is_disputed && end_offset()) {
+    filter.update(weighed(outputs));
+    end_dispute();
+    finding.rebase = true;
+  } else if (is_disputed) {
+    if (is_disputed_ && is_back) end_dispute();
+    finding = settle(time, outputs);
+  } else if (is_disputed_ && std::ranges::any_of(records_, [](const Record& each) { return each.failures > 0; })) {
+    // What is disputed was not measured.
+    for (Hypothesis* each : {slip_.get(), edge_.get(), moved_.get(), back_.get(), blind_.get()})
+      if (each->is_active) confront(*each, raw_.data(), false);
+  } else if (is_any_measured) {
+    // A sensor passes again of which nothing was said: either slip explains that better, or what was held was wrong.
+    const bool is_slip = slip_->is_active && fits(slip_->filter, raw_.data()) &&
+                         likelihood(slip_->filter, true) > likelihood(filter, true);
+    for (std::size_t s = 0; is_disputed_ && memory_->was_open && !is_slip && s < sensors_.size(); ++s) {
+      const auto was_held = [&](int j) { return held_count_ > 0 && !std::isnan(held_[0].outputs[j]); };
+      if (std::ranges::none_of(sensors_[s].outputs, was_held)) continue;
+      states_[s].reasons |= reason::rejected;
+      quiet_[s] = calm_samples_ = 0;
+    }
+    if (is_disputed_) end_dispute();
+    for (std::size_t j = 0; j < input_.size() && !is_blind_; ++j)
+      if (!std::isnan(input_[j])) believed_input_[j] = input_[j];
+  }
+  memory_->loss->update(filter, weighed(outputs));
+  if (!finding.rebase && !finding.release) {
+    copy_numbers(filter.mean(), memory_->before_update);
+    filter.update_as_expected(weighed(outputs));
+    double& beyond = memory_->beyond_bounds;
+    beyond += Memory::slip_beyond_bounds(filter, memory_->before_update, setup_.noise) - counted * usually_beyond;
+    beyond = std::min(std::max(beyond, 0.0), 2.0 * impossibly_beyond);
+    if (beyond > impossibly_beyond) {
+      input_findings_ |= reason::implausible;
+      if (!is_disputed && memory_->offsets->has_recent()) {
+        // What seemed to be off was right, and slip was not.
+        memory_->offsets->withdraw_recent(filter);
+        end_dispute();
+        beyond = 0.0;
+        finding.rebase = true;
+      }
+    }
+    memory_->impossible_samples = beyond > impossibly_beyond ? memory_->impossible_samples + is_placed : 0;
+    if (memory_->search && !is_disputed && memory_->impossible_samples > Memory::hopeless * setup_.proof) {
+      // Of a vehicle that heads elsewhere measurements ask for slip that cannot be, again and again.
+      memory_->impossible_samples = 0;
+      beyond = 0.0;
+      filter.restart_parameters(setup_.parameter_sigmas);
+      search_from(filter, *memory_->search, raw_.data());
+      memory_->offsets->forget_onsets();
+      end_dispute();
+      finding.rebase = true;
+    }
+    memory_->offsets->take(filter, std::max(1.0, *std::ranges::max_element(excesses_)), memory_->is_counted);
+    const bool is_told = told >= 0 && memory_->offsets->probable() == told;
+    const bool is_found = !is_disputed && memory_->offsets->has_suspect();
+    if (is_told) {
+      memory_->offsets->adopt_candidate(filter);
+      std::fill(records_.begin(), records_.end(), Record{});
+    } else if (is_found) {
+      memory_->offsets->adopt_suspected(filter);
+    }
+    const bool has_jumped = !is_told && !is_found && follow_biases(filter);
+    if (is_told || is_found || has_jumped) {
+      end_dispute();
+      finding.rebase = true;
+    }
+  }
+  return finding;
+}
+
+/// Positions of a vehicle that may head anywhere are neither judged nor used by what is linear about one heading: a
+/// search begins from them. What else is measured is_heading_open has used.
+SensorWatch::Finding SensorWatch::open_heading(double time, const double* outputs) noexcept {
+  copy_numbers(memory_->unplaced->mean(), own_->filter.mean());
+  copy_numbers(memory_->unplaced->covariance(), own_->filter.covariance());
+  copy_numbers(own_->filter.mean(), memory_->before_update);
+  for (std::size_t s = 0; s < sensors_.size(); ++s)
+    if (std::ranges::any_of(sensors_[s].outputs, [&](int j) { return !std::isnan(outputs[j]); })) heard_[s] = time;
+  end_dispute();
+  return {.rebase = true};
+}
+
 SensorWatch::Finding SensorWatch::judge(double time, double* outputs, const double* weights) noexcept {
   memory_->has_advanced = false;
   note_sample(time, outputs);
@@ -370,119 +486,16 @@ SensorWatch::Finding SensorWatch::judge(double time, double* outputs, const doub
   if (is_searching()) {
     finding = search_heading(outputs);
   } else if (is_active_) {
-    WalkingFilter& filter = own_->filter;
-    const bool is_open = is_unobserved_ && is_heading_open(outputs);
-    const int h = filter.model().description().roles.heading;
-    const double heading = is_open ? filter.mean()[h] : 0.0,
-                 heading_variance = is_open ? filter.covariance()(h, h) : 0.0;
-    filter.expect();
+    own_->filter.expect();
     find_stuck(outputs);
+    const bool is_open = is_heading_open(own_->filter, weighed(outputs));
     std::copy_n(outputs, raw_.size(), raw_.data());
-    bool is_disputed = false, is_any_measured = false, is_placed = false, is_back = true;
-    for (std::size_t s = 0; s < sensors_.size(); ++s) {
-      const bool has_room = innovation_count_ < static_cast<int>(innovations_.size());
-      Innovation& innovation = has_room ? innovations_[innovation_count_] : scratch_;
-      if (!filter.innovation(sensors_[s], weighed(outputs), innovation)) continue;
-      memory_->offsets->widen(filter, sensors_[s], outputs, innovation);
-      innovation_count_ += has_room;
-      is_any_measured = true;
-      innovation.time = time;
-      innovation.sensor = static_cast<int>(s);
-      innovation.accepted = admits(s, innovation);
-      heard_[s] = time;
-      if (innovation.accepted) {
-        ++states_[s].accepted;
-        if (setup_.whiteness) memory_->whiteness[s].take(innovation, sensors_[s].outputs.size());
-        is_placed = is_placed || sees_position(sensors_[s].outputs);
-        continue;
-      }
-      is_disputed = true;
-      is_back = is_back && records_[s].after_gap && records_[s].failures == 1;
-      findings_[s] |= reason::rejected;
-      ++states_[s].rejected;
-      for (const int j : sensors_[s].outputs) outputs[j] = Memory::unknown;
-    }
-    if (is_blind_) test_inputs(raw_.data());
-    unplaced_samples_ = is_placed ? 0 : unplaced_samples_ + is_disputed;
-    const int told = is_disputed ? offset_in_dispute() : -1;
-    if (is_disputed && end_offset()) {
-      filter.update(weighed(outputs));
-      end_dispute();
-      finding.rebase = true;
-    } else if (is_disputed) {
-      if (is_disputed_ && is_back) end_dispute();
-      finding = settle(time, outputs);
-    } else if (is_disputed_ && std::ranges::any_of(records_, [](const Record& each) { return each.failures > 0; })) {
-      // What is disputed was not measured.
-      for (Hypothesis* each : {slip_.get(), edge_.get(), moved_.get(), back_.get(), blind_.get()})
-        if (each->is_active) confront(*each, raw_.data(), false);
-    } else if (is_any_measured) {
-      // A sensor passes again of which nothing was said: either slip explains that better, or what was held was wrong.
-      const bool is_slip = slip_->is_active && fits(slip_->filter, raw_.data()) &&
-                           likelihood(slip_->filter, true) > likelihood(filter, true);
-      for (std::size_t s = 0; is_disputed_ && memory_->was_open && !is_slip && s < sensors_.size(); ++s) {
-        const auto was_held = [&](int j) { return held_count_ > 0 && !std::isnan(held_[0].outputs[j]); };
-        if (std::ranges::none_of(sensors_[s].outputs, was_held)) continue;
-        states_[s].reasons |= reason::rejected;
-        quiet_[s] = calm_samples_ = 0;
-      }
-      if (is_disputed_) end_dispute();
-      for (std::size_t j = 0; j < input_.size() && !is_blind_; ++j)
-        if (!std::isnan(input_[j])) believed_input_[j] = input_[j];
-    }
-    memory_->loss->update(filter, weighed(outputs));
-    if (!finding.rebase && !finding.release) {
-      copy_numbers(filter.mean(), memory_->before_update);
-      filter.update_as_expected(weighed(outputs));
-      double& beyond = memory_->beyond_bounds;
-      beyond += Memory::slip_beyond_bounds(filter, memory_->before_update, setup_.noise) - counted * usually_beyond;
-      beyond = std::min(std::max(beyond, 0.0), 2.0 * impossibly_beyond);
-      if (beyond > impossibly_beyond) {
-        input_findings_ |= reason::implausible;
-        if (!is_disputed && memory_->offsets->has_recent()) {
-          // What seemed to be off was right, and slip was not.
-          memory_->offsets->withdraw_recent(filter);
-          end_dispute();
-          beyond = 0.0;
-          finding.rebase = true;
-        }
-      }
-      memory_->impossible_samples = beyond > impossibly_beyond ? memory_->impossible_samples + is_placed : 0;
-      if (memory_->search && !is_disputed && memory_->impossible_samples > Memory::hopeless * setup_.proof) {
-        // Of a vehicle that heads elsewhere measurements ask for slip that cannot be, again and again.
-        memory_->impossible_samples = 0;
-        beyond = 0.0;
-        filter.restart_parameters(setup_.parameter_sigmas);
-        search_from(filter, *memory_->search, raw_.data());
-        memory_->offsets->forget_onsets();
-        end_dispute();
-        finding.rebase = true;
-      }
-      memory_->offsets->take(filter, std::max(1.0, *std::ranges::max_element(excesses_)), memory_->is_counted);
-      const bool is_told = told >= 0 && memory_->offsets->probable() == told;
-      const bool is_found = !is_disputed && memory_->offsets->has_suspect();
-      if (is_told) {
-        memory_->offsets->adopt_candidate(filter);
-        std::fill(records_.begin(), records_.end(), Record{});
-      } else if (is_found) {
-        memory_->offsets->adopt_suspected(filter);
-      }
-      const bool has_jumped = !is_told && !is_found && follow_biases(filter);
-      if (is_told || is_found || has_jumped) {
-        end_dispute();
-        finding.rebase = true;
-      }
-    }
+    finding = is_open ? open_heading(time, outputs) : judge_each(time, outputs);
     // The estimator's own knowledge of the motion is wrong.
     if (is_blind_ || is_unobserved_) finding = {.rebase = true};
     is_unobserved_ = false;
-    if (is_open) {
-      // A position says nothing of a heading that is too uncertain to be linearised about.
-      filter.mean()[h] = heading;
-      filter.covariance()(h, h) = heading_variance;
-    }
     if (finding.rebase) start_search(outputs);
-    if (finding.rebase) memory_->loss->follow(filter);
+    if (finding.rebase) memory_->loss->follow(own_->filter);
     // On new ground slip would not be known, either.
     if (finding.release) memory_->loss->end();
     if (finding.rebase) memory_->connected = 0;
@@ -637,6 +650,7 @@ void SensorWatch::start_search(const double* outputs) noexcept {
   filter.mean().tail(np) = memory_->before_mean.tail(np);
   for (Eigen::Index j = nx; j < nx + np; ++j) filter.covariance()(j, j) = memory_->before_covariance(j, j);
   search_from(filter, *memory_->search, outputs);
+  memory_->search->moments(filter.mean(), filter.covariance());
 }
 
 /// Starts a search from what a filter knows of each variable by itself.

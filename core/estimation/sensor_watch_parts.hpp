@@ -150,10 +150,11 @@ struct SensorWatch::Memory {
   double typical_volume = 0.0, volumes = 0.0;  ///< mean log sqrt(det P) over so many estimates
   void note_whiteness(double volume, Eigen::Index size) noexcept;
   std::unique_ptr<InformationLoss> loss;
-  std::unique_ptr<WalkingFilter> trial;   ///< for what is tried within one call
-  std::unique_ptr<WalkingFilter> ahead;   ///< behind the last sample that was judged
-  std::unique_ptr<HeadingSearch> search;  ///< null for a vehicle without a heading
-  bool is_starting = false;               ///< it is that of the start
+  std::unique_ptr<WalkingFilter> trial;     ///< for what is tried within one call
+  std::unique_ptr<WalkingFilter> ahead;     ///< behind the last sample that was judged
+  std::unique_ptr<WalkingFilter> unplaced;  ///< a filter that has used what is no position
+  std::unique_ptr<HeadingSearch> search;    ///< null for a vehicle without a heading
+  bool is_starting = false;                 ///< it is that of the start
   /// The same, of a heading that may be wrong, while it is not known who is.
   std::unique_ptr<HeadingSearch> second_thought;
   std::vector<double> first_errors;  ///< n_y: by how much rejected outputs were off when the dispute began

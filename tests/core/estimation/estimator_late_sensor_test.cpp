@@ -35,6 +35,11 @@ struct Timing {
   int ticks = 20;                ///< of 10 ms, from one position to the next
   double lateness_inputs = 0.0;  ///< [s]
   double jitter = 0.0;           ///< standard deviation of what positions are later than that [s]
+  double jitter_inputs = 0.0;    ///< of what inputs are later than their lateness [s]
+};
+struct InputMessage {
+  double arrival, stamp;
+  std::vector<double> inputs;
 };
 struct Sample {
   double error;  ///< of the position [m]
@@ -58,7 +63,7 @@ Result drive(const char* estimator_name, const Timing& timing, const Fault& faul
   const auto estimator = robot.make_estimator(truth);
   std::vector<Message> messages;
   std::vector<Eigen::Vector4d> states;
-  std::vector<std::pair<double, std::vector<double>>> inputs;
+  std::vector<InputMessage> inputs;
   for (int i = 0; i * step < duration; ++i) {
     const double time = i * step, since = time - fault_begins;
     const bool is_on = since >= 0.0 && since < fault.length;
@@ -73,18 +78,22 @@ Result drive(const char* estimator_name, const Timing& timing, const Fault& faul
            {truth[0] - antenna * std::cos(truth[2]) + 0.03 * noise(random),
             truth[1] - antenna * std::sin(truth[2]) + 0.03 * noise(random), nan});
     if (i % 5 == 1) send(time, {nan, nan, truth[3] + 0.017 * noise(random)});
-    if (i % 20 == 0) inputs.push_back({time, {speed + 0.1 * noise(random), steering * 0.4 + 0.1 * noise(random)}});
+    if (i % 20 == 0) {
+      const double lateness = timing.lateness_inputs + timing.jitter_inputs * std::abs(noise(random_lateness));
+      inputs.push_back({time + lateness, time, {speed + 0.1 * noise(random), steering * 0.4 + 0.1 * noise(random)}});
+    }
     const double v = kappa * speed * (is_on ? 1.0 - fault.lost_speed : 1.0);
     truth += step * Eigen::Vector4d(v * std::cos(truth[2]), v * std::sin(truth[2]),
                                     v / wheelbase * std::tan(0.9 * truth[3]), 0.4 * steering);
   }
   std::ranges::stable_sort(messages, {}, &Message::arrival);
+  std::ranges::stable_sort(inputs, {}, &InputMessage::arrival);
   Result result;
   std::size_t next = 0, next_input = 0;
   // Beyond the end everything has arrived.
   for (double now = 0.0; now < duration + 1.0; now += asked_every) {
-    for (; next_input < inputs.size() && inputs[next_input].first + timing.lateness_inputs <= now; ++next_input)
-      estimator->push_input(inputs[next_input].first, inputs[next_input].second.data());
+    for (; next_input < inputs.size() && inputs[next_input].arrival <= now; ++next_input)
+      estimator->push_input(inputs[next_input].stamp, inputs[next_input].inputs.data());
     for (; next < messages.size() && messages[next].arrival <= now + 1e-9; ++next)
       estimator->push_measurement(messages[next].stamp, messages[next].outputs.data());
     const double asked = std::min(now, duration - step);
@@ -190,6 +199,21 @@ TEST(SlowReceivers, ThatAreLateAreNoReasonForDoubt) {
         for (std::size_t k = 120; k < slow.samples.size(); ++k) EXPECT_EQ(slow.samples[k].words, "ok") << k;
         EXPECT_EQ(slow.counts.dropped, 0);
       }
+}
+
+/// What comes now sooner and now later, over a poor network, is missed once it is later than usual, not than its
+/// interval.
+TEST(InputsOverANetwork, AreNoReasonForDoubt) {
+  for (const char* estimator : {"ekf", "bank", "rhe"})
+    for (const double jitter : {0.1, 0.2}) {
+      const Result result = drive(estimator, {.jitter_inputs = jitter}, faults[0]);
+      int ok = 0, samples = 0;
+      for (std::size_t k = 120; k < result.samples.size(); ++k, ++samples) {
+        ok += result.samples[k].health == HealthLevel::ok;
+        EXPECT_LT(result.samples[k].error, 0.5) << k;
+      }
+      EXPECT_GT(ok, 0.98 * samples) << estimator << ", later by " << jitter << " s";
+    }
 }
 
 /// Late by about as much as an encoder's interval: whether it is waited for or not, it has come.

@@ -41,6 +41,26 @@ TEST_P(SensorVerdicts, WhileNothingComesTheCovarianceGrows) {
               });
 }
 
+/// An encoder is back before the receiver is: the first position is still that of a vehicle that may head anywhere.
+TEST_P(SensorVerdicts, WhatComesFirstBehindASilenceDoesNotHideWhatIsNotKnown) {
+  int honest = 0, samples = 0, slowest = 0;
+  expect_each_long({.spoil =
+                        [](Delivery& d) {
+                          d.has_inputs = d.has_outputs = d.since >= 19;
+                          d.outputs[0] = d.outputs[1] = nan;
+                        },
+                    .length = 20},
+                   [&](const Episode& episode) {
+                     slowest = std::max(slowest, episode.samples_to_recover(usual_error));
+                     for (const Episode::Sample& sample : episode.after) {
+                       honest += sample.inside || sample.health == HealthLevel::lost;
+                       ++samples;
+                     }
+                   });
+  EXPECT_GT(honest, 0.95 * samples);
+  EXPECT_LE(slowest, 8);
+}
+
 /// The first position behind a jump of slip waits for the next one; meanwhile it may be right.
 TEST_P(SensorVerdicts, AnEstimateInDoubtCoversSlipThatHasJumped) {
   int doubted = 0;

@@ -112,6 +112,8 @@ class RHEC_EXPORT Estimator {
   double place_on_timeline(double stamp, const double* outputs) noexcept;
   void note_delivery(double time, Measured outputs) noexcept;
   double judged_until(double time) const noexcept;
+  bool is_worth_waiting_for(std::size_t sensor) const noexcept;
+  bool may_begin_search(Measured outputs) const noexcept;
   std::size_t merge_waiting(std::size_t row) noexcept;
   bool has_waiting(double until) const noexcept;
   void estimate_for_judge(Clock::time_point deadline) noexcept;
@@ -120,7 +122,7 @@ class RHEC_EXPORT Estimator {
   /// Whether measurements are used that are not judged yet.
   bool goes_ahead() const noexcept { return used_ > watched_ + timeline_.tolerance; }
   SensorWatch::Finding judge(double time, MeasuredOutputs& outputs, Clock::time_point deadline) noexcept;
-  SensorWatch::Finding start_late(double time, const MeasuredOutputs& outputs, Clock::time_point deadline) noexcept;
+  SensorWatch::Finding judge_late(double time, MeasuredOutputs& outputs, Clock::time_point deadline) noexcept;
   int inputs_source() const noexcept { return static_cast<int>(presence_.size()); }
   double longest_silence(int source) const noexcept;
   /// For how long a message of inputs holds where none follows [s].
@@ -166,6 +168,7 @@ class RHEC_EXPORT Estimator {
   struct Age {
     double newest;       ///< stamp of that message; NaN: none
     double last, usual;  ///< at the last estimate, and before the next message comes, on average
+    double spread;       ///< mean of |age - usual| then
   };
   std::vector<Age> ages_;    ///< of the sensors, and last of the inputs
   double newest_row_ = 0.0;  ///< stamp of the newest measurement of all [s]; NaN: none

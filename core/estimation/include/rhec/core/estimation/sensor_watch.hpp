@@ -60,10 +60,11 @@ class RHEC_EXPORT SensorWatch {
   };
   /// Judges outputs (n_y, NaN where missing; weights as in Measured) of a time [s]; those not to be used become NaN.
   Finding judge(double time, double* outputs, const double* weights = nullptr) noexcept;
-  /// While there is nothing to judge by: whether a measurement, perhaps a late one, says where the vehicle begins.
-  Finding place_start(const double* outputs, const double* weights) noexcept;
-  /// Whether a late measurement of a time passes; those outputs that do not become NaN.
-  void judge_late(double time, double* outputs, const double* weights = nullptr) noexcept;
+  /// Whether a late measurement of a time passes; those outputs that do not become NaN. If the vehicle begins there, or
+  /// a search of its heading, `mean` and `covariance` are of that time, and `advance` or `search_on` go on from there.
+  Finding judge_late(double time, double* outputs, const double* weights, bool may_begin) noexcept;
+  double search_on(double time) noexcept;    ///< with the first sample behind a time: when it was; NaN: none
+  bool is_heading_unknown() const noexcept;  ///< so that a position, also a late one, may begin a search of it
   /// Behind the last sample that was judged, and before late ones that may still change that: from there on, `advance`,
   /// and whether measurements pass their gates; those outputs that do not become NaN.
   void begin_ahead() noexcept;
@@ -134,13 +135,13 @@ class RHEC_EXPORT SensorWatch {
   void find_stuck(double*outputs) noexcept, note_sample(double time, const double*outputs) noexcept;
   void note_motion(double duration, const double*inputs) noexcept, forget_reasons() noexcept;
   bool is_searching() const noexcept, is_expected(std::size_t s) const noexcept, is_heard(std::size_t s) const noexcept;
-  int offset_in_dispute() noexcept;
-  void start_search(const double* outputs) noexcept;
+  void start_search(const double*outputs) noexcept, think_again() noexcept;
   void search_from(WalkingFilter& filter, HeadingSearch& search, const double* outputs,
                    double sigma = infinity) noexcept;
-  void think_again() noexcept;
-  Finding search_heading(const double* outputs) noexcept;
-  bool is_heading_open(const double* outputs) noexcept;
+  Finding search_heading(const double*outputs) noexcept, place_start(const double*, const double*weights) noexcept;
+  bool is_heading_unknown(const WalkingFilter&) const noexcept,
+      is_heading_open(const WalkingFilter&, Measured) noexcept;
+  Finding open_heading(double time, const double*outputs) noexcept, judge_each(double time, double*outputs) noexcept;
   void start(Hypothesis& hypothesis) noexcept;
   void start_moved() noexcept;
   bool fits(WalkingFilter& filter, const double* outputs) noexcept;
@@ -151,8 +152,7 @@ class RHEC_EXPORT SensorWatch {
   Finding settle(double time, const double* outputs) noexcept;
   Finding accept(Hypothesis&hypothesis) noexcept, come_back() noexcept;
   double consider_slip() noexcept;
-  bool retract_slip() noexcept;
-  bool replay_without(const Suspicion& suspicion, WalkingFilter& filter, bool change) noexcept;
+  bool retract_slip() noexcept, replay_without(const Suspicion&suspicion, WalkingFilter&filter, bool change) noexcept;
   Finding accuse(const Suspicion& suspicion, const Record& error, const double* outputs) noexcept;
   bool consider_other(const double* outputs, Finding& finding) noexcept;
   bool is_placed_by_other(int position) const noexcept;
@@ -161,7 +161,7 @@ class RHEC_EXPORT SensorWatch {
   void note_jump() noexcept, note_followed() noexcept, begin_edge(bool is_new) noexcept;
   bool has_come_back() const noexcept, changes_slip(Hypothesis&each) noexcept;
   bool goes_on() noexcept, may_follow() const noexcept, consider_slip_before() noexcept;
-  int disputed_position() const noexcept;
+  int disputed_position() const noexcept, offset_in_dispute() noexcept;
   void hold_back(double time, const double* outputs) noexcept;
   void acquit(const double*outputs) noexcept, end_dispute() noexcept;
   bool sees_position(int output) const noexcept, sees_position(const std::vector<int>&outputs) const noexcept;
