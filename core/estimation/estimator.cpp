@@ -18,12 +18,12 @@ constexpr int checked_interval = 16;  // of so many, the integration of one is c
 constexpr int most_parts = 1000;      // largest number of parts of one prediction
 // Parts of the rest of a prediction whose time is up.
 constexpr int hasty_parts = 2;
-// A source is overdue this share of its usual interval after its message was to come, and beyond so many times what
-// messages usually are late by or early.
+// A source is overdue this share of its usual interval after its message was to come, and beyond so many standard
+// deviations of how old messages get.
 constexpr double overdue = 0.75, unusually_late = 4.0;
 // The usual age of a source's newest message is a mean over so many, how much it varies over more. None counts as more
 // than so many intervals.
-constexpr double age_memory = 5.0, spread_memory = 20.0, most_late = 1.0, most_spread = 3.0;
+constexpr double age_memory = 5.0, spread_memory = 20.0, most_late = 1.0, most_spread = 2.0;
 constexpr int most_steps = 32;  // of such a part, times those of a usual one
 // A sensor's next measurement is not before this share of its usual interval, and has come after that share, and after
 // so many times that it is usually late.
@@ -514,10 +514,15 @@ double Estimator::longest_silence(int source) const noexcept {
 /// Until the next one is missed: what an input does where nobody says so may be more than all sensors are believed.
 double Estimator::input_hold() const noexcept {
   constexpr double late_inputs = 0.5;
-  const double interval = clocks_->usual_interval(inputs_source()),
-               usual = std::max(ages_[static_cast<std::size_t>(inputs_source())].usual, interval);
-  return std::max(timeline_.input_hold, clocks_->knows_interval(inputs_source()) ? usual + late_inputs * interval
-                                                                                 : longest_silence(inputs_source()));
+  const int source = inputs_source();
+  return std::max(timeline_.input_hold, clocks_->knows_interval(source)
+                                            ? usual_age(source) + late_inputs * clocks_->usual_interval(source)
+                                            : longest_silence(source));
+}
+
+/// How old a source's newest message usually is before the next one can be used [s].
+double Estimator::usual_age(int source) const noexcept {
+  return std::max(ages_[static_cast<std::size_t>(source)].usual, clocks_->usual_interval(source));
 }
 
 /// Goes through a time in equal parts. Once the deadline has passed, the rest has only few.
@@ -569,7 +574,8 @@ void Estimator::note_ages(double time) noexcept {
     if (std::isnan(newest)) continue;
     if (newest > age.newest) {
       const double late = age.last - age.usual, interval = clocks_->usual_interval(source);
-      age.spread += (std::min(std::abs(late), most_spread * interval) - age.spread) / spread_memory;
+      const double off = std::min(std::abs(late), most_spread * interval);
+      age.variance += (off * off - age.variance) / spread_memory;
       age.usual += std::min(late, most_late * interval) / age_memory;
     }
     age.newest = newest;
@@ -585,11 +591,11 @@ SensorWatch::Presence Estimator::presence(int source, double time) const noexcep
     const bool is_missed = time - clocks_->first() > longest_silence(source);
     return is_missed ? SensorWatch::Presence::silent : SensorWatch::Presence::present;
   }
-  const Age& age = ages_[static_cast<std::size_t>(source)];
-  const double usual = std::max(age.usual, interval),
-               beyond = time - newest - std::max(usual, source == inputs_source() ? timeline_.input_hold : 0.0);
+  const double held = source == inputs_source() ? timeline_.input_hold : 0.0,
+               beyond = time - newest - std::max(usual_age(source), held);
   if (beyond > longest_silence(source) - interval) return SensorWatch::Presence::silent;
-  const double tolerance = std::max(overdue * interval, unusually_late * age.spread);
+  const double tolerance =
+      std::max(overdue * interval, unusually_late * std::sqrt(ages_[static_cast<std::size_t>(source)].variance));
   return beyond > tolerance ? SensorWatch::Presence::overdue : SensorWatch::Presence::present;
 }
 

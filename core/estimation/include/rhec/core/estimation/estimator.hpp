@@ -127,6 +127,7 @@ class RHEC_EXPORT Estimator {
   double longest_silence(int source) const noexcept;
   /// For how long a message of inputs holds where none follows [s].
   double input_hold() const noexcept;
+  double usual_age(int source) const noexcept;
   void hold_missing_inputs(double time) noexcept;
   template <class Function>
   void through_motion(double from, double to, Clock::time_point deadline, const Function& advance) noexcept;
@@ -168,7 +169,7 @@ class RHEC_EXPORT Estimator {
   struct Age {
     double newest;       ///< stamp of that message; NaN: none
     double last, usual;  ///< at the last estimate, and before the next message comes, on average
-    double spread;       ///< mean of |age - usual| then
+    double variance;     ///< of that age
   };
   std::vector<Age> ages_;    ///< of the sensors, and last of the inputs
   double newest_row_ = 0.0;  ///< stamp of the newest measurement of all [s]; NaN: none
