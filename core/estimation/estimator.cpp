@@ -26,11 +26,11 @@ constexpr double overdue = 0.75, unusually_late = 4.0;
 constexpr double age_memory = 5.0, spread_memory = 20.0, most_late = 1.0, most_spread = 2.0;
 constexpr int most_steps = 32;  // of such a part, times those of a usual one
 // A sensor's next measurement is not before this share of its usual interval, and has come after that share, and after
-// so many times that it is usually late.
-constexpr double soonest = 0.75, latest = 1.25, latest_lag = 2.0;
-constexpr double lag_memory = 5.0;    // that is a mean over so many measurements
-constexpr double least_lag = 0.05;    // of an interval: less is jitter
-constexpr double longest_wait = 0.5;  // of the time that nodes can be taken back for
+// it is late by this share of how late it usually is, and so many standard deviations more, but not by that share more.
+constexpr double soonest = 0.75, latest = 1.25, least_later = 0.1, deviations_later = 4.0, most_later = 1.0;
+constexpr double lag_memory = 5.0;     // that is a mean over so many measurements
+constexpr double least_lag = 0.05;     // of an interval: less is jitter
+constexpr double longest_wait = 0.75;  // of the time that nodes can be taken back for
 
 NodeGrid::Setup grid_setup(const EstimationMethod& method, const Estimator::Timeline& timeline) {
   if (!(timeline.longest_interval > 0.0))
@@ -96,10 +96,11 @@ Estimator::Estimator(std::unique_ptr<EstimationMethod> method, const Timeline& t
   method_->listen(watch_->make_memo());
   const std::size_t sensors = watch_->sensors().size();
   constexpr double least_lateness = 1.0;  // [s]
-  clocks_ = std::make_unique<Clocks>(
-      static_cast<int>(sensors) + 1,
-      Clocks::Setup{.usual_interval = timeline.longest_interval,
-                    .behind = std::max(least_lateness, method_->most_reach() * timeline.longest_interval)});
+  const double most_lateness = std::max(least_lateness, method_->most_reach() * timeline.longest_interval);
+  clocks_ =
+      std::make_unique<Clocks>(static_cast<int>(sensors) + 1,
+                               Clocks::Setup{.usual_interval = timeline.longest_interval, .behind = most_lateness});
+  watch_->remember_for(most_lateness);
   waiting_ = std::make_unique<MeasuredRows>(timeline.capacity, model().output_count());
   merged_ = MeasuredOutputs(model().output_count());
   for (std::size_t j = sigmas_.size(); j < merged_.size(); ++j)
@@ -114,7 +115,7 @@ Estimator::Estimator(std::unique_ptr<EstimationMethod> method, const Timeline& t
 }
 
 void Estimator::clear_deliveries() noexcept {
-  std::ranges::fill(deliveries_, Delivery{0.0, missing_value});
+  std::ranges::fill(deliveries_, Delivery{0.0, 0.0, missing_value});
   std::ranges::fill(held_inputs_, HeldInput{missing_value, missing_value});
   std::ranges::fill(ages_, Age{missing_value, 0.0, 0.0, 0.0});
   newest_row_ = ahead_ = missing_value;
@@ -238,7 +239,9 @@ void Estimator::note_delivery(double time, Measured outputs) noexcept {
     const std::vector<int>& all = watch_->sensors()[s].outputs;
     if (std::ranges::all_of(all, [&](int j) { return std::isnan(outputs[j]); })) continue;
     Delivery& each = deliveries_[s];
-    each.lag += (lag - each.lag) / lag_memory;
+    const double off = lag - each.lag;
+    each.variance += (off * off - each.variance) / lag_memory;
+    each.lag += off / lag_memory;
     if (!(each.newest >= time)) each.newest = time;
   }
   if (!(newest_row_ >= time)) newest_row_ = time;
@@ -254,20 +257,27 @@ double Estimator::judged_until(double time) const noexcept {
   for (std::size_t s = 0; s < deliveries_.size(); ++s)
     quickest = std::min(quickest, clocks_->usual_interval(static_cast<int>(s)));
   for (std::size_t s = 0; s < deliveries_.size(); ++s) {
-    const auto& [lag, newest] = deliveries_[s];
+    const double lag = deliveries_[s].lag, newest = deliveries_[s].newest;
     const double interval = clocks_->usual_interval(static_cast<int>(s));
     // What is late by less comes before the next one of any other sensor.
     if (!(lag > std::min(least_lag * interval, 0.5 * quickest)) || std::isnan(newest)) continue;
-    const double next = newest + soonest * interval, missed = newest + latest * interval + latest_lag * lag;
+    const double next = newest + soonest * interval, missed = newest + latest * interval + longest_lag(s);
     if (is_worth_waiting_for(s) && now < missed) until = std::min(until, next);
   }
   return until;
 }
 
+/// What comes later than that behind the others is later than usual [s].
+double Estimator::longest_lag(std::size_t sensor) const noexcept {
+  const Delivery& each = deliveries_[sensor];
+  const double more = least_later * each.lag + deviations_later * std::sqrt(each.variance);
+  return each.lag + std::min(more, most_later * each.lag);
+}
+
 /// Whether a sensor's measurements come so soon that the judge can wait for them.
 bool Estimator::is_worth_waiting_for(std::size_t sensor) const noexcept {
   const double interval = clocks_->usual_interval(static_cast<int>(sensor));
-  const double wait = (latest - soonest) * interval + latest_lag * deliveries_[sensor].lag;
+  const double wait = (latest - soonest) * interval + longest_lag(sensor);
   return wait < longest_wait * method_->most_reach() * timeline_.longest_interval;
 }
 

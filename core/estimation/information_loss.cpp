@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "log_volume.hpp"
 #include "numbers.hpp"
@@ -15,6 +16,7 @@ constexpr double gap = 1.5;                // an interval that is longer than so
 constexpr double jitter = 0.05;            // of an interval between samples, at least
 constexpr double early = 1e-3;             // of its interval: no output is missed before
 constexpr double deviations = 4.0;         // by which a sample is later than usual that does not come
+constexpr double memory_of_lag = 5.0;      // how late an output is is a mean over so many
 constexpr int most_missed = 16;            // samples that have not come of one prediction
 constexpr double as_good_as_equal = 0.05;  // of the logarithm of a volume
 
@@ -22,6 +24,7 @@ constexpr double as_good_as_equal = 0.05;  // of the logarithm of a volume
 
 /// Whether a sample of the output was to come up to a time; it counts then.
 bool InformationLoss::Expected::was_due(double time) noexcept {
+  time -= lag;
   const double interval = rhythm.interval();
   if (!(time - counted > (1.0 - early) * interval + deviations * rhythm.deviation())) return false;
   counted = time - counted > 2.0 * interval ? time : counted + interval;
@@ -33,6 +36,7 @@ InformationLoss::InformationLoss(const std::shared_ptr<const Model>& model, cons
   const auto ny = static_cast<std::size_t>(model->output_count());
   outputs_.assign(ny, {});
   expected_.assign(ny, false);
+  has_come_late_.assign(ny, false);
   values_.assign(ny, none);
   weights_.assign(ny, 1.0);
   factor_ = actual_.covariance();
@@ -40,7 +44,7 @@ InformationLoss::InformationLoss(const std::shared_ptr<const Model>& model, cons
 }
 
 void InformationLoss::reset() noexcept {
-  std::ranges::fill(outputs_, Expected{{}, none});
+  std::ranges::fill(outputs_, Expected{{}, none, 0.0, false});
   samples_.reset();
   since_last_ = 0.0;
   missed_ = 0;
@@ -86,21 +90,26 @@ void InformationLoss::note(double time, const double* measured) noexcept {
   since_last_ = 0.0;
   missed_ = 0;
   for (std::size_t j = 0; j < outputs_.size(); ++j) {
-    auto& [rhythm, counted] = outputs_[j];
+    Expected& output = outputs_[j];
     const bool has_come = !std::isnan(measured[j]);
-    expected_[j] = has_come || outputs_[j].was_due(time);
+    expected_[j] = has_come || output.was_due(time);
+    has_come_late_[j] = std::exchange(output.waits, false);
     if (!has_come) continue;
-    rhythm.hear(time);
-    counted = time;
+    output.rhythm.hear(time);
+    output.counted = time;
+    output.lag -= output.lag / memory_of_lag;
   }
 }
 
 void InformationLoss::note_late(double time, const double* measured) noexcept {
   for (std::size_t j = 0; j < outputs_.size(); ++j) {
     if (std::isnan(measured[j])) continue;
-    auto& [rhythm, counted] = outputs_[j];
-    rhythm.hear(time);
-    if (counted < time) counted = time;
+    Expected& output = outputs_[j];
+    output.rhythm.hear(time);
+    output.waits = true;
+    const double lag = std::max(0.0, samples_.last() - time);
+    if (std::isfinite(lag)) output.lag += (lag - output.lag) / memory_of_lag;
+    if (!(output.counted >= time)) output.counted = time;
   }
 }
 

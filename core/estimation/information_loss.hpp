@@ -32,8 +32,11 @@ class InformationLoss {
   void note(double time, const double* measured) noexcept;
   /// These have come, too, behind samples that were noted before: they are not lacking.
   void note_late(double time, const double* measured) noexcept;
-  /// Whether an output has come with it, or was to come.
-  bool is_expected(int output) const noexcept { return expected_[static_cast<std::size_t>(output)]; }
+  /// Whether an output has come with it, or late before it, or was to come.
+  bool is_expected(int output) const noexcept {
+    const auto j = static_cast<std::size_t>(output);
+    return expected_[j] || has_come_late_[j];
+  }
   /// Usual intervals of samples, and of those of an output [s]; NaN: not known.
   double usual_interval() const noexcept { return samples_.interval(); }
   double usual_interval(int output) const noexcept {
@@ -53,6 +56,8 @@ class InformationLoss {
   struct Expected {
     Rhythm rhythm;
     double counted;  ///< time of its last sample that came or was to come [s]; NaN: none
+    double lag;      ///< how late it comes behind other samples, on average [s]
+    bool waits;      ///< it has come late since the last sample
     bool was_due(double time) noexcept;
   };
   void begin(const WalkingFilter& judge) noexcept;
@@ -61,6 +66,7 @@ class InformationLoss {
   WalkingFilter actual_, complete_;
   std::vector<Expected> outputs_;         ///< n_y
   std::vector<bool> expected_;            ///< n_y, of the last sample
+  std::vector<bool> has_come_late_;       ///< n_y, since the sample before
   std::vector<double> values_, weights_;  ///< n_y, what counts of it
   Rhythm samples_;
   double since_last_ = 0.0;  ///< [s]

@@ -21,19 +21,17 @@ SensorWatch::Finding SensorWatch::judge_late(double time, double* outputs, const
   if (!is_active_) return may_begin ? place_start(outputs, weights) : Finding{};
   memory_->loss->note_late(time, outputs);
   memory_->offsets->correct(outputs);
-  const Memory::Entry* last = nullptr;
-  const auto known = static_cast<std::size_t>(std::min<std::int64_t>(memory_->count, Memory::remembered_samples));
-  for (std::size_t i = 0; i < known; ++i) {
-    const Memory::Entry& entry = memory_->entries[i];
-    if (entry.time <= time && (!last || entry.time > last->time)) last = &entry;
-  }
-  if (!last) return {};
   WalkingFilter& filter = *memory_->trial;
-  filter.mean() = last->mean;
-  filter.covariance() = last->covariance;
-  filter.predict(last->inputs.data(), time - last->time);
+  const int ago = memory_->samples_behind(time);
+  if (ago >= 0) {
+    const Memory::Entry& last = memory_->entry(ago);
+    memory_->go_back(ago, filter);
+    filter.predict(last.inputs.data(), time - last.time);
+  } else if (!memory_->past->go_to(time, filter)) {
+    return {};
+  }
   filter.expect();
-  if (may_begin && !is_searching() && is_heading_open(filter, {outputs, weights})) {
+  if (ago >= 0 && may_begin && !is_searching() && is_heading_open(filter, {outputs, weights})) {
     raw_weights_.assign(weights, weights ? weights + raw_.size() : nullptr);
     copy_numbers(filter.mean(), memory_->before_mean);
     copy_numbers(filter.covariance(), memory_->before_covariance);
@@ -62,16 +60,16 @@ SensorWatch::Finding SensorWatch::judge_late(double time, double* outputs, const
 double SensorWatch::search_on(double time) noexcept {
   Memory& memory = *memory_;
   if (!is_searching()) return Memory::unknown;
-  const auto known = static_cast<int>(std::min<std::int64_t>(memory.count, Memory::remembered_samples));
-  int ago = 0;
-  while (ago < known && memory.entry(ago).time > time) ++ago;
-  if (ago == 0 || ago == known) return Memory::unknown;
+  const int ago = memory.samples_behind(time);
+  if (ago <= 0) return Memory::unknown;
   const Memory::Entry &from = memory.entry(ago), &next = memory.entry(ago - 1);
   memory.search->predict(from.inputs.data(), next.time - std::max(from.time, time));
   memory.search->update(sensors_, next.outputs.measured());
   memory.search->moments(own_->filter.mean(), own_->filter.covariance());
   return next.time;
 }
+
+void SensorWatch::remember_for(double time) noexcept { memory_->past->cover(time); }
 
 void SensorWatch::begin_ahead() noexcept {
   copy_numbers(own_->filter.mean(), memory_->ahead->mean());

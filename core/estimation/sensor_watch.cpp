@@ -164,6 +164,7 @@ SensorWatch::SensorWatch(std::shared_ptr<const Model> model, const Setup& setup)
   memory_->trial = std::make_unique<WalkingFilter>(model, filter_setup(setup_));
   memory_->ahead = std::make_unique<WalkingFilter>(model, filter_setup(setup_));
   memory_->unplaced = std::make_unique<WalkingFilter>(model, filter_setup(setup_));
+  memory_->past = std::make_unique<PastMoments>(Memory::remembered_samples, own_->filter, model->input_count());
   memory_->loss = std::make_unique<InformationLoss>(model, filter_setup(setup_));
   own_->filter.expect();
   std::vector<OffsetWatch::Watched> watched;
@@ -219,6 +220,7 @@ void SensorWatch::reset() noexcept {
   calm_samples_ = setup_.calm;
   held_count_ = innovation_count_ = 0;
   memory_->count = memory_->connected = 0;
+  memory_->past->forget();
   memory_->has_advanced = false;
   memory_->offsets->reset();
   memory_->whiteness.assign(setup_.whiteness ? sensors_.size() : 0, {});
@@ -246,6 +248,7 @@ void SensorWatch::restart(const Eigen::VectorXd& mean, const Eigen::MatrixXd& co
   end_dispute();
   memory_->places.clear();
   memory_->count = memory_->connected = 0;
+  memory_->past->forget();
   memory_->has_advanced = false;
   memory_->loss->end();
   memory_->offsets->forget_onsets();
@@ -321,12 +324,8 @@ void SensorWatch::note_motion(double duration, const double* inputs) noexcept {
     memory.duration = 0.0;
     std::fill(input_.begin(), input_.end(), Memory::unknown);
   }
-  memory.duration += duration;
-  const double share = memory.duration > 0.0 ? duration / memory.duration : 1.0;
-  for (std::size_t j = 0; j < input_.size(); ++j) {
-    if (std::isnan(inputs[j])) continue;
-    input_[j] = std::isnan(input_[j]) ? inputs[j] : input_[j] + share * (inputs[j] - input_[j]);
-  }
+  PastMoments::add_to_mean(duration, inputs, memory.duration, input_);
+  memory.past->advance(duration, inputs);
 }
 
 /// Values of the present sample, with their weights.
@@ -728,6 +727,7 @@ void SensorWatch::remember(double time, const double* outputs) noexcept {
   Memory::Entry& entry = memory.entries[memory.newest];
   entry.time = time;
   entry.note(own_->filter);
+  memory.past->note(time, own_->filter);
   entry.outputs.assign(weighed(outputs));
   entry.rejected.assign(weighed(raw_.data()));
   entry.rejected.remove(outputs);

@@ -16,6 +16,7 @@
 #include "log_volume.hpp"
 #include "numbers.hpp"
 #include "offset_watch.hpp"
+#include "past_moments.hpp"
 #include "past_places.hpp"
 #include "rhec/core/estimation/sensor_watch.hpp"
 #include "sensor_record.hpp"
@@ -124,7 +125,15 @@ struct SensorWatch::Memory {
   }
   double now = unknown;  ///< of the last sample [s]
   std::int64_t count = 0;
-  std::int64_t connected = 0;  ///< of the newest, by what moves and by what is measured
+  std::int64_t connected = 0;         ///< of the newest, by what moves and by what is measured
+  std::unique_ptr<PastMoments> past;  ///< farther back than these
+  /// How many of these samples lie behind a time; -1: all that are left, so that nothing is known of it.
+  int samples_behind(double time) noexcept {
+    const auto known = static_cast<int>(std::min<std::int64_t>(count, remembered_samples));
+    for (int ago = 0; ago < known; ++ago)
+      if (entry(ago).time <= time) return ago;
+    return -1;
+  }
   // Before the last advance, and that.
   Eigen::VectorXd before_mean;
   Eigen::MatrixXd before_covariance;

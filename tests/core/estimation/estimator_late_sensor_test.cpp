@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <map>
 #include <random>
 #include <string>
 #include <vector>
@@ -36,6 +37,7 @@ struct Timing {
   double lateness_inputs = 0.0;  ///< [s]
   double jitter = 0.0;           ///< standard deviation of what positions are later than that [s]
   double jitter_inputs = 0.0;    ///< of what inputs are later than their lateness [s]
+  int encoder_ticks = 5;         ///< from one angle to the next
 };
 struct InputMessage {
   double arrival, stamp;
@@ -77,7 +79,7 @@ Result drive(const char* estimator_name, const Timing& timing, const Fault& faul
       send(time + timing.lateness + timing.jitter * std::abs(noise(random_lateness)),
            {truth[0] - antenna * std::cos(truth[2]) + 0.03 * noise(random),
             truth[1] - antenna * std::sin(truth[2]) + 0.03 * noise(random), nan});
-    if (i % 5 == 1) send(time, {nan, nan, truth[3] + 0.017 * noise(random)});
+    if (i % timing.encoder_ticks == 1 % timing.encoder_ticks) send(time, {nan, nan, truth[3] + 0.017 * noise(random)});
     if (i % 20 == 0) {
       const double lateness = timing.lateness_inputs + timing.jitter_inputs * std::abs(noise(random_lateness));
       inputs.push_back({time + lateness, time, {speed + 0.1 * noise(random), steering * 0.4 + 0.1 * noise(random)}});
@@ -213,6 +215,38 @@ TEST(InputsOverANetwork, AreNoReasonForDoubt) {
         EXPECT_LT(result.samples[k].error, 0.5) << k;
       }
       EXPECT_GT(ok, 0.98 * samples) << estimator << ", later by " << jitter << " s";
+    }
+}
+
+/// A receiver that is so late beside an encoder so quick that hundreds of its angles have come meanwhile is judged as
+/// others are.
+TEST(VeryLateReceivers, AreWaitedFor) {
+  const Fault moved{.name = "Moved", .length = duration, .spoil = [](double, Message& m) { displace(m, 10.0); }};
+  const std::map<std::string, double> largest{{"Spikes", 1.2},     {"Offset", 1.2},         {"WrongEncoder", 2.5},
+                                              {"NoPosition", 3.0}, {"WheelsThatSpin", 9.0}, {"Moved", 12.0}};
+  std::vector<Fault> all(std::begin(faults) + 1, std::end(faults));
+  all.push_back(moved);
+  for (const char* estimator : {"ekf", "rhe"})
+    for (const Fault& fault : all) {
+      SCOPED_TRACE(fmt::format("{}, {}", estimator, fault.name));
+      const Result late = drive(estimator, {.lateness = 2.0, .encoder_ticks = 1}, fault);
+      for (std::size_t k = 60; k < late.samples.size(); ++k)
+        EXPECT_LT(late.samples[k].error, largest.at(fault.name)) << k;
+      const Sample& last = late.samples.back();
+      EXPECT_NEAR(last.error, fault.name == "Moved" ? 10.0 : 0.0, 0.5);
+      EXPECT_EQ(last.words, "ok");
+    }
+}
+
+/// One that is too late to be waited for is held against its gates, however many samples others have had since.
+TEST(VeryLateReceivers, AreGated) {
+  for (const char* estimator : {"ekf", "rhe"})
+    for (const Fault& fault : {faults[1], faults[2]}) {
+      SCOPED_TRACE(fmt::format("{}, {}", estimator, fault.name));
+      const Result late = drive(estimator, {.lateness = 2.7, .encoder_ticks = 1}, fault);
+      for (std::size_t k = 60; k < late.samples.size(); ++k) EXPECT_LT(late.samples[k].error, 2.0) << k;
+      EXPECT_EQ(late.samples.back().words, "ok");
+      EXPECT_EQ(late.counts.dropped, 0);
     }
 }
 

@@ -112,6 +112,7 @@ class RHEC_EXPORT Estimator {
   double place_on_timeline(double stamp, const double* outputs) noexcept;
   void note_delivery(double time, Measured outputs) noexcept;
   double judged_until(double time) const noexcept;
+  double longest_lag(std::size_t sensor) const noexcept;
   bool is_worth_waiting_for(std::size_t sensor) const noexcept;
   bool may_begin_search(Measured outputs) const noexcept;
   std::size_t merge_waiting(std::size_t row) noexcept;
@@ -160,9 +161,10 @@ class RHEC_EXPORT Estimator {
   std::unique_ptr<MeasuredRows> waiting_;  ///< measurements that are not judged yet
   double watched_ = 0.0;                   ///< time of the last sample that was judged
   MeasuredOutputs merged_;
-  /// Of a sensor: how far its measurements come behind the newest one of all, on average, and its newest one [s].
+  /// Of a sensor: how far its measurements come behind the newest one of all, mean and variance, and its newest one
+  /// [s].
   struct Delivery {
-    double lag = 0.0, newest = 0.0;
+    double lag = 0.0, variance = 0.0, newest = 0.0;
   };
   std::vector<Delivery> deliveries_;
   /// How old the newest message of a source is when somebody asks for an estimate [s].

@@ -63,6 +63,7 @@ class RHEC_EXPORT SensorWatch {
   /// Whether a late measurement of a time passes; those outputs that do not become NaN. If the vehicle begins there, or
   /// a search of its heading, `mean` and `covariance` are of that time, and `advance` or `search_on` go on from there.
   Finding judge_late(double time, double* outputs, const double* weights, bool may_begin) noexcept;
+  void remember_for(double time) noexcept;   ///< how late a measurement may be [s]
   double search_on(double time) noexcept;    ///< with the first sample behind a time: when it was; NaN: none
   bool is_heading_unknown() const noexcept;  ///< so that a position, also a late one, may begin a search of it
   /// Behind the last sample that was judged, and before late ones that may still change that: from there on, `advance`,
@@ -142,8 +143,7 @@ class RHEC_EXPORT SensorWatch {
   bool is_heading_unknown(const WalkingFilter&) const noexcept,
       is_heading_open(const WalkingFilter&, Measured) noexcept;
   Finding open_heading(double time, const double*outputs) noexcept, judge_each(double time, double*outputs) noexcept;
-  void start(Hypothesis& hypothesis) noexcept;
-  void start_moved() noexcept;
+  void start(Hypothesis&hypothesis) noexcept, start_moved() noexcept;
   bool fits(WalkingFilter& filter, const double* outputs) noexcept;
   void refute(Hypothesis& hypothesis) noexcept;
   double disputed_nis(WalkingFilter& filter) noexcept;
