@@ -26,8 +26,8 @@ constexpr double overdue = 0.75, unusually_late = 4.0;
 constexpr double age_memory = 5.0, spread_memory = 20.0, most_late = 1.0, most_spread = 2.0;
 constexpr int most_steps = 32;  // of such a part, times those of a usual one
 // A sensor's next measurement is not before this share of its usual interval, and has come after that share, and after
-// it is late by this share of how late it usually is, and so many standard deviations more, but not by that share more.
-constexpr double soonest = 0.75, latest = 1.25, least_later = 0.1, deviations_later = 4.0, most_later = 1.0;
+// it is late by so much more than usual [s], and by so many standard deviations, but not by more than twice as much.
+constexpr double soonest = 0.75, latest = 1.25, least_later = 0.5, deviations_later = 4.0;
 constexpr double lag_memory = 5.0;     // that is a mean over so many measurements
 constexpr double least_lag = 0.05;     // of an interval: less is jitter
 constexpr double longest_wait = 0.75;  // of the time that nodes can be taken back for
@@ -270,8 +270,9 @@ double Estimator::judged_until(double time) const noexcept {
 /// What comes later than that behind the others is later than usual [s].
 double Estimator::longest_lag(std::size_t sensor) const noexcept {
   const Delivery& each = deliveries_[sensor];
-  const double more = least_later * each.lag + deviations_later * std::sqrt(each.variance);
-  return each.lag + std::min(more, most_later * each.lag);
+  // By how much more depends on when estimates are asked for, too: little is no reason not to wait.
+  const double more = std::max(least_later, deviations_later * std::sqrt(each.variance));
+  return each.lag + std::min(more, each.lag);
 }
 
 /// Whether a sensor's measurements come so soon that the judge can wait for them.

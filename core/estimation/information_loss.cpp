@@ -16,7 +16,6 @@ constexpr double gap = 1.5;                // an interval that is longer than so
 constexpr double jitter = 0.05;            // of an interval between samples, at least
 constexpr double early = 1e-3;             // of its interval: no output is missed before
 constexpr double deviations = 4.0;         // by which a sample is later than usual that does not come
-constexpr double memory_of_lag = 5.0;      // how late an output is is a mean over so many
 constexpr int most_missed = 16;            // samples that have not come of one prediction
 constexpr double as_good_as_equal = 0.05;  // of the logarithm of a volume
 
@@ -24,7 +23,6 @@ constexpr double as_good_as_equal = 0.05;  // of the logarithm of a volume
 
 /// Whether a sample of the output was to come up to a time; it counts then.
 bool InformationLoss::Expected::was_due(double time) noexcept {
-  time -= lag;
   const double interval = rhythm.interval();
   if (!(time - counted > (1.0 - early) * interval + deviations * rhythm.deviation())) return false;
   counted = time - counted > 2.0 * interval ? time : counted + interval;
@@ -44,7 +42,7 @@ InformationLoss::InformationLoss(const std::shared_ptr<const Model>& model, cons
 }
 
 void InformationLoss::reset() noexcept {
-  std::ranges::fill(outputs_, Expected{{}, none, 0.0, false});
+  std::ranges::fill(outputs_, Expected{{}, none, false});
   samples_.reset();
   since_last_ = 0.0;
   missed_ = 0;
@@ -97,7 +95,6 @@ void InformationLoss::note(double time, const double* measured) noexcept {
     if (!has_come) continue;
     output.rhythm.hear(time);
     output.counted = time;
-    output.lag -= output.lag / memory_of_lag;
   }
 }
 
@@ -107,9 +104,8 @@ void InformationLoss::note_late(double time, const double* measured) noexcept {
     Expected& output = outputs_[j];
     output.rhythm.hear(time);
     output.waits = true;
-    const double lag = std::max(0.0, samples_.last() - time);
-    if (std::isfinite(lag)) output.lag += (lag - output.lag) / memory_of_lag;
-    if (!(output.counted >= time)) output.counted = time;
+    // One that has never come in time is not missed: nobody knows when it was to come.
+    if (output.counted < time) output.counted = time;
   }
 }
 

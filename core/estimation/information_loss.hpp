@@ -56,7 +56,6 @@ class InformationLoss {
   struct Expected {
     Rhythm rhythm;
     double counted;  ///< time of its last sample that came or was to come [s]; NaN: none
-    double lag;      ///< how late it comes behind other samples, on average [s]
     bool waits;      ///< it has come late since the last sample
     bool was_due(double time) noexcept;
   };
