@@ -25,8 +25,8 @@ constexpr double overdue = 0.75, unusually_late = 4.0;
 // than so many intervals.
 constexpr double age_memory = 5.0, spread_memory = 20.0, most_late = 1.0, most_spread = 2.0;
 constexpr int most_steps = 32;  // of such a part, times those of a usual one
-// A sensor's next measurement is not before this share of its usual interval, and has come after that share, and after
-// it is late by so much more than usual [s], and by so many standard deviations, but not by more than twice as much.
+// A sensor's next measurement is not before this share of its usual interval. After that share of it, and what it is
+// usually late by, it is missed once it is later by so much [s], or so many standard deviations, or by as much again.
 constexpr double soonest = 0.75, latest = 1.25, least_later = 0.5, deviations_later = 4.0;
 constexpr double lag_memory = 5.0;     // that is a mean over so many measurements
 constexpr double least_lag = 0.05;     // of an interval: less is jitter
@@ -437,7 +437,7 @@ bool Estimator::judge_waiting(double until, Clock::time_point deadline) noexcept
         // What was measured before counts no longer.
         if (!take_in(now, deadline)) grid_.skip_to(now);
         rebase(watch_->mean(), watch_->covariance());
-        now = now < watched_ ? watch_->search_on(now) : missing_value;
+        now = now < watched_ ? watch_->search_on(now, is_past(deadline)) : missing_value;
       }
     } else if (!watch_->is_active()) {
       take_in(watched_, deadline);
@@ -506,9 +506,9 @@ SensorWatch::Finding Estimator::judge(double time, MeasuredOutputs& outputs, Clo
 /// A row that comes late. Where a vehicle of which nothing was known begins by it, the judge goes on from there.
 SensorWatch::Finding Estimator::judge_late(double time, MeasuredOutputs& outputs, Clock::time_point deadline) noexcept {
   const bool was_active = watch_->is_active();
-  const bool may_begin = !was_active || may_begin_search(outputs.measured());
+  const bool may_search = may_begin_search(outputs.measured());
   const SensorWatch::Finding finding =
-      watch_->judge_late(time, outputs.values(), outputs.measured().weights, may_begin);
+      watch_->judge_late(time, outputs.values(), outputs.measured().weights, may_search);
   if (finding.rebase && !was_active)
     through_motion(time, watched_, deadline,
                    [&](double begin, double end) { watch_->advance(end - begin, grid_.mean_input(begin, end)); });

@@ -62,12 +62,9 @@ SensorWatch::Finding SensorWatch::place_start(const double* outputs, const doubl
 /// the first behind a gap: what has come about while they were measured is for a dispute to settle.
 bool SensorWatch::is_heading_open(const WalkingFilter& filter, Measured outputs) noexcept {
   const Roles& roles = filter.model().description().roles;
-  if (!is_heading_unknown(filter)) return false;
+  if (!memory_->is_heading_unknown(filter)) return false;
   for (std::size_t s = 0; s < sensors_.size() && !is_unobserved_; ++s)
     if (is_heard(s) && sees_position(sensors_[s].outputs)) return false;
-  WalkingFilter& without = *memory_->unplaced;
-  copy_numbers(filter.mean(), without.mean());
-  copy_numbers(filter.covariance(), without.covariance());
   bool has_x = false, has_y = false;
   for (std::size_t j = 0; j < raw_.size(); ++j) {
     const bool sees_x = filter.depends_on(static_cast<int>(j), roles.position_x),
@@ -77,16 +74,13 @@ bool SensorWatch::is_heading_open(const WalkingFilter& filter, Measured outputs)
     has_y = has_y || (sees_y && !std::isnan(outputs[j]));
   }
   if (!has_x || !has_y) return false;
+  WalkingFilter& without = *memory_->unplaced;
+  copy_numbers(filter.mean(), without.mean());
+  copy_numbers(filter.covariance(), without.covariance());
   without.update({raw_.data(), outputs.weights});
-  return is_heading_unknown(without);
+  return memory_->is_heading_unknown(without);
 }
 
-bool SensorWatch::is_heading_unknown(const WalkingFilter& filter) const noexcept {
-  if (!memory_->search) return false;
-  const int heading = filter.model().description().roles.heading;
-  return filter.covariance()(heading, heading) > Memory::known_heading * Memory::known_heading;
-}
-
-bool SensorWatch::is_heading_unknown() const noexcept { return is_heading_unknown(own_->filter); }
+bool SensorWatch::is_heading_unknown() const noexcept { return memory_->is_heading_unknown(own_->filter); }
 
 }  // namespace rhec

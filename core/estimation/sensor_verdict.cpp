@@ -17,8 +17,8 @@ constexpr double typical_volume_memory = 300.0;
 }  // namespace
 
 SensorWatch::Finding SensorWatch::judge_late(double time, double* outputs, const double* weights,
-                                             bool may_begin) noexcept {
-  if (!is_active_) return may_begin ? place_start(outputs, weights) : Finding{};
+                                             bool may_search) noexcept {
+  if (!is_active_) return place_start(outputs, weights);
   memory_->loss->note_late(time, outputs);
   memory_->offsets->correct(outputs);
   WalkingFilter& filter = *memory_->trial;
@@ -31,15 +31,13 @@ SensorWatch::Finding SensorWatch::judge_late(double time, double* outputs, const
     return {};
   }
   filter.expect();
-  if (ago >= 0 && may_begin && !is_searching() && is_heading_open(filter, {outputs, weights})) {
+  if (ago >= 0 && may_search && !is_searching() && is_heading_open(filter, {outputs, weights})) {
     raw_weights_.assign(weights, weights ? weights + raw_.size() : nullptr);
     copy_numbers(filter.mean(), memory_->before_mean);
     copy_numbers(filter.covariance(), memory_->before_covariance);
     const Finding finding = open_heading(time, outputs);
     is_unobserved_ = false;
-    start_search(outputs);
-    memory_->loss->follow(own_->filter);
-    memory_->connected = 0;
+    begin_anew(outputs);
     return finding;
   }
   for (std::size_t s = 0; s < sensors_.size(); ++s) {
@@ -57,12 +55,11 @@ SensorWatch::Finding SensorWatch::judge_late(double time, double* outputs, const
   return {};
 }
 
-double SensorWatch::search_on(double time) noexcept {
+double SensorWatch::search_on(double time, bool is_hasty) noexcept {
   Memory& memory = *memory_;
-  if (!is_searching()) return Memory::unknown;
   const int ago = memory.samples_behind(time);
   if (ago <= 0) return Memory::unknown;
-  const Memory::Entry &from = memory.entry(ago), &next = memory.entry(ago - 1);
+  const Memory::Entry &from = memory.entry(ago), &next = memory.entry(is_hasty ? 0 : ago - 1);
   memory.search->predict(from.inputs.data(), next.time - std::max(from.time, time));
   memory.search->update(sensors_, next.outputs.measured());
   memory.search->moments(own_->filter.mean(), own_->filter.covariance());

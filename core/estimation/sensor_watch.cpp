@@ -493,11 +493,9 @@ SensorWatch::Finding SensorWatch::judge(double time, double* outputs, const doub
     // The estimator's own knowledge of the motion is wrong.
     if (is_blind_ || is_unobserved_) finding = {.rebase = true};
     is_unobserved_ = false;
-    if (finding.rebase) start_search(outputs);
-    if (finding.rebase) memory_->loss->follow(own_->filter);
+    if (finding.rebase) begin_anew(outputs);
     // On new ground slip would not be known, either.
     if (finding.release) memory_->loss->end();
-    if (finding.rebase) memory_->connected = 0;
     if (finding.release) std::copy(raw_.begin(), raw_.end(), outputs);
     note_corrected(finding.rebase || finding.release);
     remember(time, outputs);
@@ -632,16 +630,21 @@ bool SensorWatch::is_still_off(std::size_t sensor, const Innovation& innovation)
 
 bool SensorWatch::is_searching() const noexcept { return memory_->search && memory_->search->is_active(); }
 
+/// The judge has gone elsewhere at a sample.
+void SensorWatch::begin_anew(const double* outputs) noexcept {
+  start_search(outputs);
+  memory_->loss->follow(own_->filter);
+  memory_->connected = 0;
+}
+
 /// A heading that has become unknown is searched once the position is measured again.
 void SensorWatch::start_search(const double* outputs) noexcept {
-  if (!memory_->search) return;
+  if (!is_heading_unknown()) return;
   const Roles& roles = own_->filter.model().description().roles;
-  const int h = roles.heading;
-  const bool is_unknown = own_->filter.covariance()(h, h) > Memory::known_heading * Memory::known_heading;
   bool is_placed = false;
   for (int j = 0; j < static_cast<int>(raw_.size()); ++j)
     is_placed = is_placed || (!std::isnan(outputs[j]) && own_->filter.depends_on(j, roles.position_x));
-  if (!is_unknown || !is_placed) return;
+  if (!is_placed) return;
   // What a position says of slip, through a motion that nobody knows, is nothing: slip is as it was before. Nor do
   // correlations of what was far too uncertain to be linearised mean anything.
   WalkingFilter& filter = own_->filter;

@@ -164,6 +164,12 @@ struct SensorWatch::Memory {
   std::unique_ptr<WalkingFilter> unplaced;  ///< a filter that has used what is no position
   std::unique_ptr<HeadingSearch> search;    ///< null for a vehicle without a heading
   bool is_starting = false;                 ///< it is that of the start
+  /// Whether a heading is to be searched, by what a filter knows of it.
+  bool is_heading_unknown(const WalkingFilter& filter) const noexcept {
+    if (!search) return false;
+    const int heading = filter.model().description().roles.heading;
+    return filter.covariance()(heading, heading) > known_heading * known_heading;
+  }
   /// The same, of a heading that may be wrong, while it is not known who is.
   std::unique_ptr<HeadingSearch> second_thought;
   std::vector<double> first_errors;  ///< n_y: by how much rejected outputs were off when the dispute began

@@ -60,11 +60,13 @@ class RHEC_EXPORT SensorWatch {
   };
   /// Judges outputs (n_y, NaN where missing; weights as in Measured) of a time [s]; those not to be used become NaN.
   Finding judge(double time, double* outputs, const double* weights = nullptr) noexcept;
-  /// Whether a late measurement of a time passes; those outputs that do not become NaN. If the vehicle begins there, or
-  /// a search of its heading, `mean` and `covariance` are of that time, and `advance` or `search_on` go on from there.
-  Finding judge_late(double time, double* outputs, const double* weights, bool may_begin) noexcept;
-  void remember_for(double time) noexcept;   ///< how late a measurement may be [s]
-  double search_on(double time) noexcept;    ///< with the first sample behind a time: when it was; NaN: none
+  /// Whether a late measurement of a time passes; those outputs that do not become NaN. If the vehicle begins there,
+  /// or, where it may, a search of its heading, moments are of that time, and `advance` or `search_on` go on from
+  /// there.
+  Finding judge_late(double time, double* outputs, const double* weights, bool may_search) noexcept;
+  void remember_for(double time) noexcept;  ///< how late a measurement may be [s]
+  /// With the first sample behind a time, or the last one, if there is no time for more: when it was; NaN: none.
+  double search_on(double time, bool is_hasty) noexcept;
   bool is_heading_unknown() const noexcept;  ///< so that a position, also a late one, may begin a search of it
   /// Behind the last sample that was judged, and before late ones that may still change that: from there on, `advance`,
   /// and whether measurements pass their gates; those outputs that do not become NaN.
@@ -136,18 +138,16 @@ class RHEC_EXPORT SensorWatch {
   void find_stuck(double*outputs) noexcept, note_sample(double time, const double*outputs) noexcept;
   void note_motion(double duration, const double*inputs) noexcept, forget_reasons() noexcept;
   bool is_searching() const noexcept, is_expected(std::size_t s) const noexcept, is_heard(std::size_t s) const noexcept;
-  void start_search(const double*outputs) noexcept, think_again() noexcept;
+  void start_search(const double*) noexcept, begin_anew(const double*outputs) noexcept, think_again() noexcept;
   void search_from(WalkingFilter& filter, HeadingSearch& search, const double* outputs,
                    double sigma = infinity) noexcept;
   Finding search_heading(const double*outputs) noexcept, place_start(const double*, const double*weights) noexcept;
-  bool is_heading_unknown(const WalkingFilter&) const noexcept,
-      is_heading_open(const WalkingFilter&, Measured) noexcept;
+  bool is_heading_open(const WalkingFilter& filter, Measured outputs) noexcept;
   Finding open_heading(double time, const double*outputs) noexcept, judge_each(double time, double*outputs) noexcept;
   void start(Hypothesis&hypothesis) noexcept, start_moved() noexcept;
   bool fits(WalkingFilter& filter, const double* outputs) noexcept;
   void refute(Hypothesis& hypothesis) noexcept;
-  double disputed_nis(WalkingFilter& filter) noexcept;
-  double likelihood(WalkingFilter& filter, bool with_rejected) noexcept;
+  double disputed_nis(WalkingFilter&filter) noexcept, likelihood(WalkingFilter&filter, bool with_rejected) noexcept;
   void confront(Hypothesis& hypothesis, const double* outputs, bool counts) noexcept;
   Finding settle(double time, const double* outputs) noexcept;
   Finding accept(Hypothesis&hypothesis) noexcept, come_back() noexcept;
