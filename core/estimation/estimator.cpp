@@ -18,8 +18,8 @@ constexpr int checked_interval = 16;  // of so many, the integration of one is c
 constexpr int most_parts = 1000;      // largest number of parts of one prediction
 // Parts of the rest of a prediction whose time is up.
 constexpr int hasty_parts = 2;
-// A source is overdue this share of its usual interval after its message was to come, and beyond so many standard
-// deviations of how old messages get.
+// A source is overdue this share of its usual interval, or of a step if that is longer, after its message was to come,
+// and beyond so many standard deviations of how old messages get.
 constexpr double overdue = 0.75, unusually_late = 4.0;
 // The usual age of a source's newest message is a mean over so many, how much it varies over more. None counts as more
 // than so many intervals.
@@ -605,8 +605,8 @@ SensorWatch::Presence Estimator::presence(int source, double time) const noexcep
   const double held = source == inputs_source() ? timeline_.input_hold : 0.0,
                beyond = time - newest - std::max(usual_age(source), held);
   if (beyond > longest_silence(source) - interval) return SensorWatch::Presence::silent;
-  const double tolerance =
-      std::max(overdue * interval, unusually_late * std::sqrt(ages_[static_cast<std::size_t>(source)].variance));
+  const double tolerance = std::max(overdue * std::max(interval, timeline_.longest_interval),
+                                    unusually_late * std::sqrt(ages_[static_cast<std::size_t>(source)].variance));
   return beyond > tolerance ? SensorWatch::Presence::overdue : SensorWatch::Presence::present;
 }
 

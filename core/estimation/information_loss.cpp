@@ -109,22 +109,21 @@ void InformationLoss::note_late(double time, const double* measured) noexcept {
   }
 }
 
-void InformationLoss::update(const WalkingFilter& judge, Measured used) noexcept {
+void InformationLoss::update(const WalkingFilter& judge, Measured used, bool counts) noexcept {
   bool is_lacking = false;
   for (std::size_t j = 0; j < expected_.size(); ++j)
     is_lacking = is_lacking || (expected_[j] && std::isnan(used[static_cast<std::ptrdiff_t>(j)]));
   if (is_lacking)
     begin(judge);
   else
-    ++samples_since_;
+    samples_since_ += counts;
   if (!is_active_) return;
-  ++samples_above_;
+  samples_above_ += counts;
   for (std::size_t j = 0; j < weights_.size(); ++j) weights_[j] = used.weight(static_cast<std::ptrdiff_t>(j));
-  const auto take = [&](WalkingFilter& filter, auto&& counts) {
+  const auto take = [&](WalkingFilter& filter, auto&& has) {
     copy_numbers(judge.mean(), filter.mean());
     filter.expect();
-    for (std::size_t j = 0; j < values_.size(); ++j)
-      values_[j] = counts(j) ? filter.expected(static_cast<int>(j)) : none;
+    for (std::size_t j = 0; j < values_.size(); ++j) values_[j] = has(j) ? filter.expected(static_cast<int>(j)) : none;
     filter.update_as_expected({values_.data(), weights_.data()});
   };
   take(complete_, [&](std::size_t j) { return expected_[j]; });

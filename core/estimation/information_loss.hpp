@@ -20,12 +20,12 @@ class InformationLoss {
 
   bool is_active() const noexcept { return is_active_; }
   void end() noexcept;
-  /// Samples since something was lacking, while it is active.
+  /// Samples that count since something was lacking, while it is active.
   int samples_since() const noexcept { return samples_since_; }
   /// By how much the volume of the covariance's ellipsoid is too large: a logarithm, 0 while it is not active.
   double excess() const noexcept { return excess_; }
   static constexpr double most_volume = 2.0;  ///< of the volume without loss: more is much
-  /// Samples in a row after which it was more.
+  /// Samples that count in a row after which it was more.
   int samples_above() const noexcept { return samples_above_; }
 
   /// A sample at a time [s] with these outputs (n_y, NaN where missing).
@@ -46,8 +46,9 @@ class InformationLoss {
   /// From the judge's moments before `duration` [s] with an input (n_u). `more_sigmas` (n_u, or null) as in
   /// SensorWatch::advance: nobody has said what the input is.
   void predict(const WalkingFilter& judge, const double* inputs, double duration, const double* more_sigmas) noexcept;
-  /// That sample, before the judge uses what is left of it (n_y).
-  void update(const WalkingFilter& judge, Measured used) noexcept;
+  /// That sample, before the judge uses what is left of it (n_y). `counts`: one of a quick sensor beside a slow one
+  /// that says where the vehicle is does not.
+  void update(const WalkingFilter& judge, Measured used, bool counts = true) noexcept;
   /// After the judge has gone elsewhere at this sample, or by itself.
   void follow(const WalkingFilter& judge) noexcept;
 

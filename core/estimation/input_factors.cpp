@@ -9,7 +9,7 @@ namespace rhec {
 namespace {
 
 // Of an interval [s] that is short for every vehicle.
-constexpr double duration = 0.05;
+constexpr double step_duration = 0.05;
 // Sine of the angle between derivatives of the next state that are no two directions.
 constexpr double same_direction = 1e-6;
 constexpr double first_share = 0.3, second_share = 0.45;
@@ -44,7 +44,7 @@ InputFactors::InputFactors(const Model& model)
                      .inputs = inputs.data(),
                      .parameters = parameters.data(),
                      .parameters_end = parameters.data(),
-                     .durations = &duration,
+                     .durations = &step_duration,
                      .next_states = next.data(),
                      .jacobians = jacobian.data()});
     for (int p = 0; p < np; ++p) {

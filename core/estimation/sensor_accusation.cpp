@@ -17,7 +17,7 @@ constexpr int wrong_since[] = {3, 6, 12, 24};
 // Measurements of a disputed position at which that is looked for.
 constexpr int looked_for = 5;
 // Samples that may be replayed for it within one call.
-constexpr int most_replayed = 256;
+constexpr int most_replayed = 512;
 // A sensor that is off since then has jumped by at least this share of its innovation at once, as nu' S^-1 nu.
 constexpr double at_once = 0.25;
 // How wrong an angle may have been made by a sensor before it was rejected [rad].
@@ -57,7 +57,7 @@ bool SensorWatch::replay_without(const Suspicion& suspicion, WalkingFilter& filt
       if (sees_position(each.outputs) && filter.innovation(each, positions, scratch_))
         are_explained = are_explained && scratch_.nis <= close_limits_[static_cast<std::size_t>(scratch_.value.size())];
   };
-  memory.go_back(suspicion.ago, filter);
+  memory.recent->go_back(suspicion.ago, filter);
   if (suspicion.anew) {
     filter.restart_parameters(setup_.parameter_sigmas);
     const std::vector<Variable>& states = filter.model().description().states;
@@ -67,8 +67,8 @@ bool SensorWatch::replay_without(const Suspicion& suspicion, WalkingFilter& filt
       filter.covariance()(i, i) = std::max(filter.covariance()(i, i), sigma * sigma);
     }
   }
-  memory.replay(suspicion.ago, filter, [&](Memory::Entry& entry) {
-    compare(entry.outputs.measured(), entry.rejected.measured());
+  memory.recent->replay(suspicion.ago, filter, [&](RecentSamples::Entry& entry) {
+    compare(entry.judged(), entry.rejected.measured());
     memory.replayed = entry.outputs;
     memory.replayed.remove(memory.retracted.data());
     memory.replayed.add(entry.rejected.measured());
@@ -90,14 +90,14 @@ SensorWatch::Finding SensorWatch::accuse(const Suspicion& suspicion, const Recor
   Memory& memory = *memory_;
   held_count_ = memory.jump_count = 0;
   for (int ago = suspicion.ago; ago-- > 0 && held_count_ < std::ssize(held_);) {
-    const Memory::Entry& entry = memory.entry(ago);
+    const RecentSamples::Entry& entry = memory.recent->entry(ago);
     const double* const rejected = entry.rejected.measured().values;
     if (std::all_of(rejected, rejected + raw_.size(), [](double each) { return std::isnan(each); })) continue;
     Held& held = held_[held_count_++];
     held.time = entry.time;
     held.outputs = entry.rejected;
   }
-  const double since = memory.entry(suspicion.ago).time;
+  const double since = memory.recent->entry(suspicion.ago).time;
   memory.released = {since, since, memory.retracted.data()};
   memory.since_release = std::numeric_limits<int>::max();
   replay_without(suspicion, own_->filter, true);
@@ -146,7 +146,7 @@ bool SensorWatch::consider_other(const double* outputs, Finding& finding) noexce
   if (is_late && !is_unexplained) return false;
   int replayed = 0;
   for (const int positions : wrong_since) {
-    const int ago = memory.samples_with_positions(positions);
+    const int ago = memory.recent->with_positions(positions);
     if (ago == 0 || memory.has_gap(ago)) return false;
     for (std::size_t s = 0; s < sensors_.size(); ++s) {
       if (sees_position(sensors_[s].outputs)) continue;
@@ -154,7 +154,8 @@ bool SensorWatch::consider_other(const double* outputs, Finding& finding) noexce
       const Suspicion suspicion{.sensor = s, .ago = ago, .anew = own.failures > 0 || is_late};
       // One that fails at once with the position does so because of slip.
       if (own.failures > 0 && own.failures < suspect_after + record.failures) continue;
-      if (suspicion.anew && ago <= std::max(own.failures, record.failures)) continue;
+      const double since = own.failures > 0 ? std::min(own.since, record.since) : record.since;
+      if (suspicion.anew && ago <= memory.recent->since(since) + 1) continue;
       std::ranges::fill(memory.retracted, Memory::unknown);
       for (const int j : sensors_[s].outputs) memory.retracted[static_cast<std::size_t>(j)] = 0.0;
       // An encoder that is much quicker than the position makes that long.
@@ -168,6 +169,7 @@ bool SensorWatch::consider_other(const double* outputs, Finding& finding) noexce
         error.begin(scratch_);
       }
       error.failures = std::max(ago, suspect_after);
+      error.since = memory.recent->entry(ago - 1).time;
       finding = accuse(suspicion, error, outputs);
       return true;
     }

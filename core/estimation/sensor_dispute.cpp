@@ -148,14 +148,14 @@ bool SensorWatch::retract_slip() noexcept {
   const bool is_slip = slip_->is_active && memory.slip_beyond < Memory::impossible_slip;
   if (disputed_samples_ != 1 || is_slip || memory.since_release > soon || !is_position_disputed()) return false;
   int ago = 0;
-  while (ago < memory.connected && memory.entry(ago).time > memory.released.outputs_from) ++ago;
-  if (ago == memory.connected) return false;
+  while (ago < memory.recent->connected() && memory.recent->entry(ago).time > memory.released.outputs_from) ++ago;
+  if (ago == memory.recent->connected()) return false;
   for (std::size_t s = 0; s < sensors_.size(); ++s)
     for (const int j : sensors_[s].outputs)
       memory.retracted[j] = (findings_[s] & reason::rejected) ? raw_[j] : Memory::unknown;
   WalkingFilter& filter = own_->filter;
-  memory.go_back(ago, filter);
-  memory.replay(ago, filter, [&](Memory::Entry& entry) {
+  memory.recent->go_back(ago, filter);
+  memory.recent->replay(ago, filter, [&](RecentSamples::Entry& entry) {
     entry.outputs.remove(memory.retracted.data());
     filter.update(entry.outputs.measured());
     entry.note(filter);
@@ -241,20 +241,20 @@ bool SensorWatch::consider_slip_before() noexcept {
   // After a gap there is little to be used anew.
   if (std::ranges::any_of(records_, [](const Record& each) { return each.after_gap; })) return false;
   for (const int positions : changed_before) {
-    const int back = memory_->samples_with_positions(positions);
+    const int back = memory_->recent->with_positions(positions);
     if (back == 0) return false;
     WalkingFilter& filter = slip_->filter;
-    memory_->go_back(back, filter);
+    memory_->recent->go_back(back, filter);
     filter.restart_parameters(setup_.parameter_sigmas);
     double beyond = 0.0;
-    memory_->replay(back, filter, [&](const Memory::Entry& entry) {
+    memory_->recent->replay(back, filter, [&](const RecentSamples::Entry& entry) {
       copy_numbers(filter.mean(), memory_->before_slip);
       filter.update(entry.outputs.measured());
       beyond = std::max(beyond, Memory::slip_beyond_bounds(filter, memory_->before_slip, setup_.noise));
     });
     filter.predict(input_.data(), memory_->duration);
     if (beyond > unlikely_slip || !fits(filter, raw_.data())) continue;
-    memory_->jumps[0] = memory_->entry(back).time;
+    memory_->jumps[0] = memory_->recent->entry(back).time;
     return true;
   }
   return false;
@@ -273,7 +273,7 @@ double SensorWatch::consider_slip() noexcept {
     start(*slip_);
     held_count_ = 0;
     memory_->jump_count = 1;
-    memory_->jumps[0] = memory_->entry(0).time;
+    memory_->jumps[0] = memory_->recent->keep_newest();
     const bool explains = disputed_nis(slip_->filter) <= left_unexplained * disputed_nis(own_->filter) &&
                           fits(slip_->filter, raw_.data());
     if (!explains && !consider_slip_before()) {
@@ -286,7 +286,7 @@ double SensorWatch::consider_slip() noexcept {
     copy_numbers(slip_->filter.mean(), memory_->before_slip);
     slip_->filter.update(weighed(raw_.data()));
     note_beyond();
-    memory_->jumps[1] = memory_->entry(0).time;
+    memory_->jumps[1] = memory_->recent->keep_newest();
     memory_->jump_count = 2;
     edge_->is_active = false;
     return new_likelihood;
@@ -325,7 +325,7 @@ void SensorWatch::note_followed() noexcept {
 SensorWatch::Finding SensorWatch::settle(double time, const double* outputs) noexcept {
   if (!is_disputed_) memory_->was_calm = std::min(calm_samples_, memory_->undisputed_samples) >= setup_.calm;
   is_disputed_ = true;
-  if (++disputed_samples_ == 1) memory_->disputed_from = memory_->entry(0).time;
+  if (++disputed_samples_ == 1) memory_->disputed_from = memory_->recent->keep_newest();
   for (std::size_t s = 0; s < sensors_.size() && disputed_samples_ == 1; ++s)
     for (const int j : sensors_[s].outputs)
       memory_->first_errors[j] =

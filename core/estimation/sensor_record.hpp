@@ -9,6 +9,7 @@ namespace rhec {
 /// What a sensor has done in a row.
 struct SensorWatch::Record {
   int failures = 0, passes = 0;
+  double since = 0.0;             ///< time of the first of these failures [s]
   int steady = 0;                 ///< samples that count, since when it has failed by one error
   int agrees = 0;                 ///< samples that count, since when this error is one that would not have failed
   int right_again = 0;            ///< failures in a row that it would not have if it were not off any more

@@ -13,6 +13,7 @@ namespace {
 
 constexpr double volume_memory = 10.0;  // that the usual volume is a mean over so many estimates before
 constexpr double typical_volume_memory = 300.0;
+constexpr double a_while = 1.0;  // by which a position is late, so that a heading is to be half as certain [s]
 
 }  // namespace
 
@@ -22,16 +23,19 @@ SensorWatch::Finding SensorWatch::judge_late(double time, double* outputs, const
   memory_->loss->note_late(time, outputs);
   memory_->offsets->correct(outputs);
   WalkingFilter& filter = *memory_->trial;
-  const int ago = memory_->samples_behind(time);
+  const int ago = memory_->recent->behind(time);
   if (ago >= 0) {
-    const Memory::Entry& last = memory_->entry(ago);
-    memory_->go_back(ago, filter);
+    const RecentSamples::Entry& last = memory_->recent->entry(ago);
+    memory_->recent->go_back(ago, filter);
     filter.predict(last.inputs.data(), time - last.time);
   } else if (!memory_->past->go_to(time, filter)) {
     return {};
   }
   filter.expect();
-  if (ago >= 0 && may_search && !is_searching() && is_heading_open(filter, {outputs, weights})) {
+  // A search takes as much longer as the position is late. Meanwhile one heading is better than none for the longer.
+  const double longer = std::max(0.0, memory_->now - time) / a_while;
+  if (ago >= 0 && may_search && !is_searching() && memory_->is_heading_unknown(filter, 1.0 + longer) &&
+      is_heading_open(filter, {outputs, weights})) {
     raw_weights_.assign(weights, weights ? weights + raw_.size() : nullptr);
     copy_numbers(filter.mean(), memory_->before_mean);
     copy_numbers(filter.covariance(), memory_->before_covariance);
@@ -57,9 +61,9 @@ SensorWatch::Finding SensorWatch::judge_late(double time, double* outputs, const
 
 double SensorWatch::search_on(double time, bool is_hasty) noexcept {
   Memory& memory = *memory_;
-  const int ago = memory.samples_behind(time);
+  const int ago = memory.recent->behind(time);
   if (ago <= 0) return Memory::unknown;
-  const Memory::Entry &from = memory.entry(ago), &next = memory.entry(is_hasty ? 0 : ago - 1);
+  const RecentSamples::Entry &from = memory.recent->entry(ago), &next = memory.recent->entry(is_hasty ? 0 : ago - 1);
   memory.search->predict(from.inputs.data(), next.time - std::max(from.time, time));
   memory.search->update(sensors_, next.outputs.measured());
   memory.search->moments(own_->filter.mean(), own_->filter.covariance());

@@ -33,8 +33,10 @@ constexpr double most_excess = 100.0, excess_memory = 500.0;
 // with all times since when it may be so.
 constexpr double offset_gate = 7.0;
 // Slip at its bound, of which measurements ask for more by this many of its standard deviations in all, beside so many
-// a sample, does not explain how the vehicle moves.
-constexpr double impossibly_beyond = 4.0, usually_beyond = 0.75;
+// a sample, does not explain how the vehicle moves. A sample of a quick sensor beside a slow one that says where the
+// vehicle is may ask for as much as is usual at a bound: more than the mean of half a Gaussian variable, 0.4, times the
+// standard deviation of how much it moves slip.
+constexpr double impossibly_beyond = 4.0, usually_beyond = 0.75, at_its_bound = 0.5;
 
 int sensor_of(int output, const std::vector<Sensor>& sensors) noexcept {
   for (std::size_t s = 0; s < sensors.size(); ++s)
@@ -164,7 +166,7 @@ SensorWatch::SensorWatch(std::shared_ptr<const Model> model, const Setup& setup)
   memory_->trial = std::make_unique<WalkingFilter>(model, filter_setup(setup_));
   memory_->ahead = std::make_unique<WalkingFilter>(model, filter_setup(setup_));
   memory_->unplaced = std::make_unique<WalkingFilter>(model, filter_setup(setup_));
-  memory_->past = std::make_unique<PastMoments>(Memory::remembered_samples, own_->filter, model->input_count());
+  memory_->past = std::make_unique<PastMoments>(Memory::past_moments, own_->filter, model->input_count());
   memory_->loss = std::make_unique<InformationLoss>(model, filter_setup(setup_));
   own_->filter.expect();
   std::vector<OffsetWatch::Watched> watched;
@@ -178,15 +180,10 @@ SensorWatch::SensorWatch(std::shared_ptr<const Model> model, const Setup& setup)
   memory_->before_covariance = Eigen::MatrixXd::Zero(n, n);
   memory_->away = memory_->before_update = memory_->before_slip = memory_->before_mean;
   memory_->factor = memory_->before_covariance;
-  for (Memory::Entry& entry : memory_->entries) {
-    entry.mean = memory_->before_mean;
-    entry.covariance = memory_->before_covariance;
-    entry.inputs.assign(model->input_count(), 0.0);
-    entry.outputs = entry.rejected = MeasuredOutputs(model->output_count());
-  }
-  memory_->replayed = memory_->entries[0].outputs;
+  memory_->recent = std::make_unique<RecentSamples>(own_->filter);
+  memory_->replayed = MeasuredOutputs(model->output_count());
   raw_.assign(model->output_count(), Memory::unknown);
-  memory_->first_errors = memory_->retracted = raw_;
+  memory_->first_errors = memory_->retracted = memory_->expected = raw_;
   input_.assign(model->input_count(), 0.0);
   believed_input_ = input_;
   held_.assign(held_capacity, {0.0, MeasuredOutputs(model->output_count())});
@@ -219,7 +216,7 @@ void SensorWatch::reset() noexcept {
   input_findings_ = 0;
   calm_samples_ = setup_.calm;
   held_count_ = innovation_count_ = 0;
-  memory_->count = memory_->connected = 0;
+  memory_->recent->forget();
   memory_->past->forget();
   memory_->has_advanced = false;
   memory_->offsets->reset();
@@ -247,7 +244,7 @@ void SensorWatch::restart(const Eigen::VectorXd& mean, const Eigen::MatrixXd& co
   if (memory_->search) memory_->search->cancel();
   end_dispute();
   memory_->places.clear();
-  memory_->count = memory_->connected = 0;
+  memory_->recent->forget();
   memory_->past->forget();
   memory_->has_advanced = false;
   memory_->loss->end();
@@ -294,7 +291,7 @@ void SensorWatch::advance(double duration, const double* inputs, const double* m
   for (Hypothesis* each : {moved_.get(), back_.get()})
     if (each->is_active && !memory_->has_advanced) each->note_before();
   note_motion(duration, inputs);
-  if (memory_->count > 0) std::copy(input_.begin(), input_.end(), memory_->entries[memory_->newest].inputs.begin());
+  memory_->recent->note_inputs(input_);
   if (is_blind_) {
     memory_->offsets->forget_onsets();
     blind_->filter.mean() = own_->filter.mean();
@@ -414,12 +411,14 @@ SensorWatch::Finding SensorWatch::judge_each(double time, double* outputs) noexc
     for (std::size_t j = 0; j < input_.size() && !is_blind_; ++j)
       if (!std::isnan(input_[j])) believed_input_[j] = input_[j];
   }
-  memory_->loss->update(filter, weighed(outputs));
+  memory_->loss->update(filter, weighed(outputs), memory_->is_counted);
   if (!finding.rebase && !finding.release) {
     copy_numbers(filter.mean(), memory_->before_update);
     filter.update_as_expected(weighed(outputs));
     double& beyond = memory_->beyond_bounds;
-    beyond += Memory::slip_beyond_bounds(filter, memory_->before_update, setup_.noise) - counted * usually_beyond;
+    const double allowed =
+        counted ? usually_beyond : at_its_bound * std::min(1.0, Memory::usual_change_of_slip(filter));
+    beyond += Memory::slip_beyond_bounds(filter, memory_->before_update, setup_.noise) - allowed;
     beyond = std::min(std::max(beyond, 0.0), 2.0 * impossibly_beyond);
     if (beyond > impossibly_beyond) {
       input_findings_ |= reason::implausible;
@@ -552,7 +551,10 @@ bool SensorWatch::admits(std::size_t sensor, const Innovation& innovation) noexc
   if (record.failures < suspect_after)
     excess += (std::min(innovation.nis / degrees, most_excess) - excess) / excess_memory;
   if (!passes) {
-    if (record.failures == 0) record.after_gap = comes_back;
+    if (record.failures == 0) {
+      record.after_gap = comes_back;
+      record.since = memory_->now;
+    }
     const auto size = static_cast<std::size_t>(innovation.value.size());
     record.note_failure(innovation, limits_[size], close_limits_[size]);
     const bool is_right_again = memory_->offsets->is_right_again(sensors_[sensor].outputs.front(), innovation);
@@ -634,7 +636,7 @@ bool SensorWatch::is_searching() const noexcept { return memory_->search && memo
 void SensorWatch::begin_anew(const double* outputs) noexcept {
   start_search(outputs);
   memory_->loss->follow(own_->filter);
-  memory_->connected = 0;
+  memory_->recent->disconnect();
 }
 
 /// A heading that has become unknown is searched once the position is measured again.
@@ -718,29 +720,31 @@ void SensorWatch::note_corrected(bool has_jumped) noexcept {
     for (int i = 0; i < states && !has_jumped; ++i)
       expected += filter.derivative(j, i) * (filter.mean()[i] - memory_->before_update[i]);
     memory_->stuck.corrected(static_cast<std::size_t>(j), expected);
+    memory_->expected[static_cast<std::size_t>(j)] = expected;
   }
 }
 
 /// `outputs`: that were used.
 void SensorWatch::remember(double time, const double* outputs) noexcept {
   Memory& memory = *memory_;
-  memory.newest = static_cast<std::size_t>(memory.count % static_cast<std::int64_t>(memory.entries.size()));
-  ++memory.count;
-  ++memory.connected;
-  Memory::Entry& entry = memory.entries[memory.newest];
-  entry.time = time;
-  entry.note(own_->filter);
-  memory.past->note(time, own_->filter);
-  entry.outputs.assign(weighed(outputs));
-  entry.rejected.assign(weighed(raw_.data()));
-  entry.rejected.remove(outputs);
-  entry.has_position = false;
+  bool has_position = false;
+  double quickest = std::numeric_limits<double>::infinity();
+  MeasuredOutputs& rejected = memory.replayed;
+  rejected.assign(weighed(raw_.data()));
+  rejected.remove(outputs);
   for (std::size_t j = 0; j < raw_.size(); ++j) {
-    if (!sees_position(static_cast<int>(j)))
-      entry.rejected.values()[j] = Memory::unknown;
-    else
-      entry.has_position = entry.has_position || !std::isnan(raw_[j]);
+    if (!sees_position(static_cast<int>(j))) {
+      rejected.values()[j] = Memory::unknown;
+      continue;
+    }
+    has_position = has_position || !std::isnan(raw_[j]);
+    const double interval = memory.loss->usual_interval(static_cast<int>(j));
+    if (interval < quickest) quickest = interval;
   }
+  const bool is_known = std::isfinite(quickest);
+  memory.recent->join_within(is_known ? std::min(setup_.step, quickest / Memory::most_between_positions) : 0.0);
+  memory.recent->remember(time, own_->filter, memory.expected, weighed(outputs), rejected.measured(), has_position);
+  memory.past->note(time, own_->filter);
 }
 
 }  // namespace rhec

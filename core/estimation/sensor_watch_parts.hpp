@@ -18,6 +18,7 @@
 #include "offset_watch.hpp"
 #include "past_moments.hpp"
 #include "past_places.hpp"
+#include "recent_samples.hpp"
 #include "rhec/core/estimation/sensor_watch.hpp"
 #include "sensor_record.hpp"
 #include "stuck_values.hpp"
@@ -60,7 +61,9 @@ struct SensorWatch::Hypothesis {
 /// What was known after the last samples, and the motion since then.
 struct SensorWatch::Memory {
   static constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
-  static constexpr std::size_t remembered_samples = 128;
+  static constexpr std::size_t past_moments = 128;
+  // Samples without a position that are remembered between two of them, at most.
+  static constexpr double most_between_positions = 16.0;
   // Silence after which a sensor that disagrees is more likely right than the estimate [s], and in usual intervals.
   static constexpr double longest_gap = 1.0, usual_intervals_of_gap = 2.5;
   static bool is_gap(double duration, double usual_interval) noexcept {
@@ -75,65 +78,16 @@ struct SensorWatch::Memory {
   // Slip that would be beyond its bounds by so many standard deviations has not jumped.
   static constexpr double impossible_slip = 3.0;
 
-  struct Entry {
-    double time = unknown;
-    Eigen::VectorXd mean;
-    Eigen::MatrixXd covariance;
-    std::vector<double> inputs;  ///< until the next one
-    MeasuredOutputs outputs;     ///< that were used
-    MeasuredOutputs rejected;    ///< positions that were not
-    bool has_position = false;   ///< of either kind
-
-    void note(const WalkingFilter& filter) noexcept {
-      copy_numbers(filter.mean(), mean);
-      copy_numbers(filter.covariance(), covariance);
-    }
-  };
-  std::vector<Entry> entries{remembered_samples};
-  std::size_t newest = 0;
-  Entry& entry(int ago) noexcept {
-    return entries[(newest + entries.size() - static_cast<std::size_t>(ago)) % entries.size()];
-  }
-  /// A filter that knows what was known so many samples ago, and perhaps less, goes through what has been measured
-  /// since: `take_in(entry)` at each of these samples, once it has been predicted.
-  template <class TakeIn>
-  void replay(int since, WalkingFilter& filter, TakeIn take_in) noexcept {
-    for (int ago = since; ago > 0; --ago) {
-      Entry& next = entry(ago - 1);
-      filter.predict(entry(ago).inputs.data(), next.time - entry(ago).time);
-      take_in(next);
-    }
-  }
-  void go_back(int ago, WalkingFilter& filter) noexcept {
-    copy_numbers(entry(ago).mean, filter.mean());
-    copy_numbers(entry(ago).covariance, filter.covariance());
-  }
-  /// How many of the newest samples it takes to have so many positions, used or rejected, and what was known before; 0:
-  /// so many are not remembered.
-  int samples_with_positions(int positions) noexcept {
-    for (int ago = 1; ago < std::min<std::int64_t>(connected, remembered_samples); ++ago) {
-      positions -= entry(ago - 1).has_position;
-      if (positions == 0) return ago;
-    }
-    return 0;
-  }
-  /// Whether nothing was measured for long within so many samples.
+  std::unique_ptr<RecentSamples> recent;
+  std::unique_ptr<PastMoments> past;  ///< farther back than these
+  std::vector<double> expected;       ///< n_y, behind the last sample
+  /// Whether nothing was measured for long within so many of the newest of these.
   bool has_gap(int samples) noexcept {
     for (int ago = samples; ago > 0; --ago)
-      if (is_gap(entry(ago - 1).time - entry(ago).time, loss->usual_interval())) return true;
+      if (is_gap(recent->entry(ago - 1).time - recent->entry(ago).time, loss->usual_interval())) return true;
     return false;
   }
   double now = unknown;  ///< of the last sample [s]
-  std::int64_t count = 0;
-  std::int64_t connected = 0;         ///< of the newest, by what moves and by what is measured
-  std::unique_ptr<PastMoments> past;  ///< farther back than these
-  /// How many of these samples lie behind a time; -1: all that are left, so that nothing is known of it.
-  int samples_behind(double time) noexcept {
-    const auto known = static_cast<int>(std::min<std::int64_t>(count, remembered_samples));
-    for (int ago = 0; ago < known; ++ago)
-      if (entry(ago).time <= time) return ago;
-    return -1;
-  }
   // Before the last advance, and that.
   Eigen::VectorXd before_mean;
   Eigen::MatrixXd before_covariance;
@@ -164,11 +118,12 @@ struct SensorWatch::Memory {
   std::unique_ptr<WalkingFilter> unplaced;  ///< a filter that has used what is no position
   std::unique_ptr<HeadingSearch> search;    ///< null for a vehicle without a heading
   bool is_starting = false;                 ///< it is that of the start
-  /// Whether a heading is to be searched, by what a filter knows of it.
-  bool is_heading_unknown(const WalkingFilter& filter) const noexcept {
+  /// Whether a heading is to be searched, by what a filter knows of it; by so many times the usual limit.
+  bool is_heading_unknown(const WalkingFilter& filter, double times = 1.0) const noexcept {
     if (!search) return false;
     const int heading = filter.model().description().roles.heading;
-    return filter.covariance()(heading, heading) > known_heading * known_heading;
+    const double limit = times * known_heading;
+    return filter.covariance()(heading, heading) > limit * limit;
   }
   /// The same, of a heading that may be wrong, while it is not known who is.
   std::unique_ptr<HeadingSearch> second_thought;
@@ -201,6 +156,19 @@ struct SensorWatch::Memory {
       for (int j = 0; j < filter.model().output_count(); ++j)
         if (const KalmanFilter::Use use = filter.use(j); use.variance > 0.0) slip += use.gain[nx + p] * use.innovation;
       most = std::max(most, std::max(lower - slip, slip - upper) / std::sqrt(variance));
+    }
+    return most;
+  }
+  /// After an update: how much it was to move the slip that it has moved most, in standard deviations of that slip.
+  static double usual_change_of_slip(const WalkingFilter& filter) noexcept {
+    double most = 0.0;
+    for (Eigen::Index p = filter.model().state_count(); p < filter.mean().size(); ++p) {
+      double change = 0.0;
+      for (int j = 0; j < filter.model().output_count(); ++j)
+        if (const KalmanFilter::Use use = filter.use(j); use.variance > 0.0)
+          change += use.gain[p] * use.gain[p] * use.variance;
+      if (const double variance = filter.covariance()(p, p); variance > 0.0)
+        most = std::max(most, std::sqrt(change / variance));
     }
     return most;
   }

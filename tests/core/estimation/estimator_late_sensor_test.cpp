@@ -232,9 +232,10 @@ TEST(VeryLateReceivers, AreWaitedFor) {
       const Result late = drive(estimator, {.lateness = 2.0, .encoder_ticks = 1}, fault);
       for (std::size_t k = 60; k < late.samples.size(); ++k)
         EXPECT_LT(late.samples[k].error, largest.at(fault.name)) << k;
-      const Sample& last = late.samples.back();
-      EXPECT_NEAR(last.error, fault.name == "Moved" ? 10.0 : 0.0, 0.5);
-      EXPECT_EQ(last.words, "ok");
+      EXPECT_NEAR(late.samples.back().error, fault.name == "Moved" ? 10.0 : 0.0, 0.5);
+      // Behind the end of the drive time stands still, while positions still come: they are less late than was learnt.
+      const auto end = static_cast<std::size_t>(std::lround(duration / asked_every)) - 1;
+      for (std::size_t k = end - 20; k <= end; ++k) EXPECT_EQ(late.samples[k].words, "ok") << k;
     }
 }
 
