@@ -190,6 +190,24 @@ TEST(QuickEncoders, ThatAreOffAreNotFollowedBesideASlowReceiver) {
   }
 }
 
+/// An encoder at 100 Hz beside a receiver at 1 or 2 Hz: so many of its angles come between two positions that a memory
+/// of samples would hold one or two of these, and nothing could be tried anew from before something went wrong.
+TEST(QuickEncoders, DoNotMakeTheJudgeForget) {
+  const Fault off{.name = "Off", .length = 20.0, .spoil = [](double, Message& m) { m.outputs[2] += 0.15; }};
+  const Fault slippery{.name = "Slippery", .length = 10.0, .spoil = {}, .lost_speed = 0.3};
+  const std::map<std::string, double> largest{{"Nothing", 0.5}, {"WrongEncoder", 1.0}, {"Off", 1.5}, {"Slippery", 4.0}};
+  for (const char* estimator : {"ekf", "bank", "rhe"})
+    for (const Fault& fault : {faults[0], faults[3], off, slippery})
+      for (const int ticks : {50, 100}) {
+        SCOPED_TRACE(fmt::format("{}, {}, every {} s", estimator, fault.name, 0.01 * ticks));
+        const Result result = drive(estimator, {.lateness = 0.17, .ticks = ticks, .encoder_ticks = 1}, fault);
+        const auto end = static_cast<std::size_t>(std::lround(duration / asked_every));
+        for (std::size_t k = 100; k < end; ++k) EXPECT_LT(result.samples[k].error, largest.at(fault.name)) << k;
+        for (std::size_t k = 100; k < end && fault.name == "Nothing"; ++k)
+          EXPECT_EQ(result.samples[k].words, "ok") << k;
+      }
+}
+
 /// Nobody is told how slow a receiver is, nor how late it and the inputs are: that is no reason for doubt.
 TEST(SlowReceivers, ThatAreLateAreNoReasonForDoubt) {
   for (const char* estimator : {"ekf", "bank", "rhe"})
