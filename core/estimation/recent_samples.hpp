@@ -17,7 +17,7 @@ namespace rhec {
 /// so that what was believed can be tried anew from before a sensor was wrong. Only its constructor allocates.
 ///
 /// Sensors may be a hundred times as quick as a receiver is. So that some of its positions are remembered however
-/// quick they are, samples without one become a single one while they are less than a given time apart. What that one
+/// quick they are, samples without one become a single one within a given time. What that one
 /// says of an output is what is expected at its time, and the mean by which what was measured was off, with the
 /// information of all: as good as the samples one by one, as far as the output's derivatives stay as they are.
 class RecentSamples {
@@ -59,7 +59,8 @@ class RecentSamples {
   Entry& entry(int ago) noexcept {
     return entries_[(newest_ + entries_.size() - static_cast<std::size_t>(ago)) % entries_.size()];
   }
-  /// The newest sample stays one of its own; its time [s].
+  /// The newest sample stays one of its own, as where something begins behind it, or what the filter knew there has
+  /// been made anew; its time [s].
   double keep_newest() noexcept {
     entry(0).is_kept = true;
     return entry(0).time;

@@ -101,6 +101,7 @@ SensorWatch::Finding SensorWatch::accuse(const Suspicion& suspicion, const Recor
   memory.released = {since, since, memory.retracted.data()};
   memory.since_release = std::numeric_limits<int>::max();
   replay_without(suspicion, own_->filter, true);
+  memory.recent->keep_newest();
   bool was_used = false;
   for (const int j : sensors_[suspicion.sensor].outputs) {
     double& value = raw_[static_cast<std::size_t>(j)];

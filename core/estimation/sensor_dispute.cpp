@@ -160,6 +160,7 @@ bool SensorWatch::retract_slip() noexcept {
     filter.update(entry.outputs.measured());
     entry.note(filter);
   });
+  memory.recent->keep_newest();
   memory.before_mean = filter.mean();
   memory.before_covariance = filter.covariance();
   filter.predict(input_.data(), memory.duration);
