@@ -98,7 +98,8 @@ void InformationLoss::note(double time, const double* measured) noexcept {
   }
 }
 
-void InformationLoss::note_late(double time, const double* measured) noexcept {
+void InformationLoss::note_late(double time, const double* measured, bool counts) noexcept {
+  samples_since_ += counts;
   for (std::size_t j = 0; j < outputs_.size(); ++j) {
     if (std::isnan(measured[j])) continue;
     Expected& output = outputs_[j];

@@ -30,8 +30,8 @@ class InformationLoss {
 
   /// A sample at a time [s] with these outputs (n_y, NaN where missing).
   void note(double time, const double* measured) noexcept;
-  /// These have come, too, behind samples that were noted before: they are not lacking.
-  void note_late(double time, const double* measured) noexcept;
+  /// These have come, too, behind samples that were noted before: they are not lacking. `counts` as of `update`.
+  void note_late(double time, const double* measured, bool counts = true) noexcept;
   /// Whether an output has come with it, or late before it, or was to come.
   bool is_expected(int output) const noexcept {
     const auto j = static_cast<std::size_t>(output);

@@ -39,10 +39,10 @@ class RecentSamples {
       copy_numbers(filter.covariance(), covariance);
     }
     /// What each sample may be judged by: several together say more than any gate was made for.
-    Measured judged() const noexcept { return {outputs.measured().values, samples > 1 ? nullptr : weights()}; }
-
-   private:
-    const double* weights() const noexcept { return outputs.measured().weights; }
+    Measured judged() const noexcept {
+      const Measured all = outputs.measured();
+      return samples > 1 ? Measured(all.values) : all;
+    }
   };
   static constexpr std::size_t capacity = 512;
 

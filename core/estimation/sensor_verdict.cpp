@@ -20,7 +20,10 @@ constexpr double a_while = 1.0;  // by which a position is late, so that a headi
 SensorWatch::Finding SensorWatch::judge_late(double time, double* outputs, const double* weights,
                                              bool may_search) noexcept {
   if (!is_active_) return place_start(outputs, weights);
-  memory_->loss->note_late(time, outputs);
+  bool has_position = false;
+  for (int j = 0; j < static_cast<int>(raw_.size()); ++j)
+    has_position = has_position || (!std::isnan(outputs[j]) && sees_position(j));
+  memory_->loss->note_late(time, outputs, has_position);
   memory_->offsets->correct(outputs);
   WalkingFilter& filter = *memory_->trial;
   const int ago = memory_->recent->behind(time);

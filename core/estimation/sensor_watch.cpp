@@ -416,9 +416,9 @@ SensorWatch::Finding SensorWatch::judge_each(double time, double* outputs) noexc
     copy_numbers(filter.mean(), memory_->before_update);
     filter.update_as_expected(weighed(outputs));
     double& beyond = memory_->beyond_bounds;
-    const double allowed =
-        counted ? usually_beyond : at_its_bound * std::min(1.0, Memory::usual_change_of_slip(filter));
-    beyond += Memory::slip_beyond_bounds(filter, memory_->before_update, setup_.noise) - allowed;
+    beyond += Memory::slip_beyond_bounds(filter, memory_->before_update, setup_.noise);
+    if (beyond > 0.0)
+      beyond -= counted ? usually_beyond : at_its_bound * std::min(1.0, Memory::usual_change_of_slip(filter));
     beyond = std::min(std::max(beyond, 0.0), 2.0 * impossibly_beyond);
     if (beyond > impossibly_beyond) {
       input_findings_ |= reason::implausible;

@@ -103,7 +103,7 @@ struct SensorWatch::Memory {
   double disputed_from = unknown;                       ///< behind this time what is disputed was measured
   Retraction released{unknown, unknown, nullptr};       ///< what would have to be taken back of that
   std::vector<double> retracted;                        ///< n_y, not missing of outputs that were wrong then
-  MeasuredOutputs replayed;                             ///< what counts of a sample that is replayed
+  MeasuredOutputs replayed;                             ///< what counts of a sample that is replayed or remembered
   /// How far slip that explains what is disputed is beyond its bounds, in its standard deviations.
   double slip_beyond = 0.0;
   StuckValues stuck;
