@@ -114,9 +114,9 @@ TEST_F(Inputs, AreNotKnownByMoreThanThereIs) {
   guess.predicted(Eigen::Vector2d::Zero(), 10.0 * P);
   const Eigen::Matrix2d less = 0.01 * P;
   guess.begin(missing, 0.2, less);
-  Eigen::Matrix4d joint;
+  Eigen::MatrixXd joint(4, 4);
   joint << less, guess.with_state(), guess.with_state().transpose(), guess.covariance();
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d> eigen(joint);
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(joint);
   EXPECT_GT(eigen.eigenvalues()[0], 0.0);
   EXPECT_GT(guess.with_state()(0, 0), 0.0);
 }

@@ -185,7 +185,7 @@ TEST(RiccatiKernels, TakeFurtherControlsBehindTheFirstTwo) {
 
 /// A symmetric matrix with its eigenvalues' absolute values, by Eigen.
 Eigen::Matrix2d reflected(const Eigen::Matrix2d& matrix) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(matrix);
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(matrix);
   return eigen.eigenvectors() * eigen.eigenvalues().cwiseAbs().asDiagonal() * eigen.eigenvectors().transpose();
 }
 
