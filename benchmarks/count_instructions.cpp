@@ -57,7 +57,7 @@ void count(const std::string& file, int steps) {
   if (steps < 1 || uncounted_steps + steps > count)
     throw Error(file + ": has " + std::to_string(count) + " problems, of which " + std::to_string(uncounted_steps) +
                 " are not counted");
-  records.resize(static_cast<std::size_t>(uncounted_steps + steps));
+  records.resize(static_cast<std::size_t>(uncounted_steps) + static_cast<std::size_t>(steps));
   const Host host;
   sim::make_terms(records, host);
   const Sequence sequence = sequence_of(records, host.make_model(records.front().model, records.front().model_options));

@@ -22,9 +22,17 @@ class InnovationWhiteness {
   /// By how much larger the variance of a covariance that was learnt from this sensor is to be; 1 where sums are no
   /// larger than expected by more than a standard deviation of what is known of them.
   double factor() const noexcept { return factor_; }
+  /// How much larger the squares of sums of innovations are than those of as many independent ones of the same size,
+  /// once the mean of late is taken out: because errors last, and not because they are constant.
+  double correlation() const noexcept { return correlation_; }
+  /// The same of the last `count`, or of as many as are remembered, about a straight line: what is left of a sensor
+  /// that is off by a constant since then, or by more and more.
+  double correlation_of_last(std::size_t count) const noexcept;
+  /// Innovations that were taken so far.
+  std::size_t count() const noexcept { return count_; }
 
  private:
-  static constexpr std::size_t levels = 7, longest = 1u << (levels - 1);
+  static constexpr std::size_t levels = 7, longest = 1u << (levels - 1), remembered = 4 * longest;
   struct Level {
     double variance = 0.0;  ///< of a sum over 2^level, relative to what is expected
     double count = 0.0, gain = 0.0;
@@ -32,10 +40,11 @@ class InnovationWhiteness {
   };
   using Values = std::array<double, most_sensor_outputs>;
   std::array<Level, levels> levels_{};
-  std::array<Values, longest> sums_{};  ///< of all innovations until one, in a ring
-  Values sum_{};
+  std::array<Values, remembered> sums_{};  ///< of all innovations until one, in a ring
+  Values sum_{}, mean_{};
+  std::size_t values_ = 0;
   std::size_t count_ = 0;
-  double factor_ = 1.0;
+  double factor_ = 1.0, correlation_ = 1.0;
 };
 
 }  // namespace rhec

@@ -93,8 +93,10 @@ void InputWalks::write(int interval, const double* parameters, double* data, dou
 }
 
 void InputWalks::write_kept(const std::vector<double>& acting, int node, double* v) const noexcept {
-  for (std::size_t k = 0; k < inputs_.size(); ++k)
-    v[k] = acting[static_cast<std::size_t>(std::max(node - 1, 0) * vehicle_->input_count() + inputs_[k].input)];
+  for (std::size_t k = 0; k < inputs_.size(); ++k) {
+    const int at = std::max(node - 1, 0) * vehicle_->input_count() + inputs_[k].input;
+    v[k] = acting[static_cast<std::size_t>(at)];
+  }
 }
 
 void InputWalks::to_own(int interval, const double* v, double* inputs) const noexcept {

@@ -17,6 +17,9 @@ constexpr double strange = 2.0;
 constexpr int most_onsets = 7, young = 20, unproven = 10, oldest = 150;
 // The difference of two outputs shows at once: so many onsets of it are enough.
 constexpr int onsets_of_rivals = 3;
+// Errors of receivers last, as those by reflections. Until so many innovations tell, the squares of their sums are so
+// many times larger than those of independent errors.
+constexpr double correlation_of_receivers = 2.0, innovations_to_know = 150.0;
 // An offset is as probable as none where b^^2 is so many times its variance, and not worth a thought below.
 constexpr double even_odds = 25.0, improbable = 16.0;
 // The probability that it is the other one of two outputs that is off.
@@ -150,7 +153,7 @@ bool OffsetWatch::has_young(int watched) const noexcept {
 }
 
 /// Where there is no room, the onset gives way that explains the least; the one that explains the most stays.
-void OffsetWatch::begin(int watched, double excess, double left_out) noexcept {
+void OffsetWatch::begin(int watched, const Onset& onset) noexcept {
   std::size_t least = onsets_.size();
   const auto worth = [this](std::size_t m) {
     return onsets_[m].watched < 0 || onsets_[m].age > oldest ? -1.0 : constant(static_cast<int>(m)).explained();
@@ -166,7 +169,7 @@ void OffsetWatch::begin(int watched, double excess, double left_out) noexcept {
   }
   if (least == onsets_.size()) return;
   const auto lane = static_cast<Eigen::Index>(least);
-  onsets_[least] = {.watched = watched, .age = 0, .excess = excess, .left_out = left_out};
+  onsets_[least] = onset;
   set(static_cast<int>(least), {});
   is_off_.row(lane).setZero();
   is_off_(lane, outputs_[watched]) = 1.0;
@@ -231,7 +234,8 @@ void OffsetWatch::widen_by_candidate(const WalkingFilter& filter, const Sensor& 
 }
 
 /// One output after the other, as the filter has done it: innovations of a sample are then independent.
-void OffsetWatch::take(const WalkingFilter& filter, double excess, bool counts) noexcept {
+void OffsetWatch::take(const WalkingFilter& filter, double excess,
+                       std::span<const InnovationWhiteness* const> whiteness, bool counts) noexcept {
   if (outputs_.empty()) return;
   const double kept = 1.0 - 1.0 / memory;
   for (std::size_t k = 0; counts && k < outputs_.size(); ++k) {
@@ -239,13 +243,28 @@ void OffsetWatch::take(const WalkingFilter& filter, double excess, bool counts) 
     const Constant all = constant(ever);
     set(ever, {kept * all.information, kept * all.score, kept * all.squares, kept * all.count});
   }
+  // Innovations of a single angle are correlated by slip, too, which is not to keep an offset from being found.
+  const auto whiteness_of = [&](int watched) -> const InnovationWhiteness* {
+    if (whiteness.empty() || rivals_[watched] < 0) return nullptr;
+    return whiteness[static_cast<std::size_t>(outputs_[watched])];
+  };
+  const auto correlation_of = [&](int watched) {
+    const InnovationWhiteness* known = whiteness_of(watched);
+    if (!known) return 1.0;
+    const double unknown = std::max(0.0, 1.0 - static_cast<double>(known->count()) / innovations_to_know);
+    return std::max(known->correlation(), 1.0 + unknown * (correlation_of_receivers - 1.0));
+  };
   for (int j = 0; j < filter.model().output_count(); ++j) {
     const KalmanFilter::Use use = filter.use(j);
     if (!(use.variance > 0.0)) continue;
     const double square = use.innovation * use.innovation / use.variance;
     const bool is_strange = square > strange * strange;
     if (const int k = watched_of_[j]; k >= 0 && (is_strange || !has_young(k)))
-      begin(k, excess, std::max(0.0, square - most_counted * most_counted));
+      begin(k, {.watched = k,
+                .excess = excess,
+                .correlation = correlation_of(k),
+                .first = whiteness_of(k) ? whiteness_of(k)->count() : 0,
+                .left_out = std::max(0.0, square - most_counted * most_counted)});
     note(filter, j, use);
   }
   suspect_ = refuted_ = candidate_ = -1;
@@ -258,28 +277,44 @@ void OffsetWatch::take(const WalkingFilter& filter, double excess, bool counts) 
     known.by_x = filter.derivative(outputs_[k], position_x_);
     known.by_y = filter.derivative(outputs_[k], position_y_);
   }
+  // What an offset does is in the correlation, too: one that has always been there has the least of late.
+  for (int k = 0; k < std::ssize(outputs_); ++k) onsets_[k].correlation = correlation_of(k);
+  for (const Onset& each : onsets_)
+    if (each.watched >= 0) {
+      Onset& ever = onsets_[static_cast<std::size_t>(each.watched)];
+      ever.correlation = std::min(ever.correlation, each.correlation);
+    }
   double most = improbable;
   for (std::size_t m = 0; m < onsets_.size(); ++m) {
     Onset& each = onsets_[m];
     if (each.watched < 0) continue;
     each.age += counts;
     // What an offset does is in the excess, too, but not before it began.
-    const double usual = m < outputs_.size() ? excess : std::min(excess, each.excess);
+    const double alone = m < outputs_.size() ? excess : std::min(excess, each.excess), usual = alone * each.correlation;
     const int lane = static_cast<int>(m);
     // None is more significant than what it explains.
-    if (!(score_[lane] * score_[lane] > (most - each.left_out) * usual * information_[lane])) continue;
+    if (!(score_[lane] * score_[lane] > (most - each.left_out) * alone * information_[lane])) continue;
     const Constant found = constant(lane);
-    double significance = found.significance() / usual;
+    const bool is_end = ends(each.watched, found);
+    double significance = found.significance() / (is_end ? alone : usual);
     // Slip that has jumped does not just take back what an output was off by.
-    if (each.left_out > 0.0 && ends(each.watched, found)) significance += each.left_out;
+    if (is_end) significance += each.left_out;
     if (!(significance > most) || !is_possible(each.watched, found.value())) continue;
     most = significance;
     candidate_ = lane;
   }
   if (candidate_ < 0) return;
   const int watched = onsets_[candidate_].watched;
+  const bool is_end = ends(watched, constant(candidate_));
+  if (const InnovationWhiteness* known = whiteness_of(watched);
+      known && !is_end && candidate_ >= std::ssize(outputs_)) {
+    const Onset& onset = onsets_[candidate_];
+    most *= std::min(1.0, onset.correlation / known->correlation_of_last(known->count() - onset.first));
+    if (!(most > improbable)) candidate_ = -1;
+    if (candidate_ < 0) return;
+  }
   const bool is_measured = filter.use(outputs_[watched]).variance > 0.0;
-  if (is_measured && most > (ends(watched, constant(candidate_)) ? improbable : limit_)) suspect_ = candidate_;
+  if (is_measured && most > (is_end ? improbable : limit_)) suspect_ = candidate_;
   probability_ = 1.0 / (1.0 + std::exp(0.5 * (even_odds - most)));
 }
 

@@ -1,10 +1,12 @@
 #pragma once
 
 #include <algorithm>
+#include <span>
 #include <vector>
 
 #include <Eigen/Core>
 
+#include "innovation_whiteness.hpp"
 #include "rhec/core/estimation/estimate.hpp"
 #include "walking_filter.hpp"
 
@@ -50,8 +52,11 @@ class OffsetWatch {
   void widen_by_candidate(const WalkingFilter& filter, const Sensor& sensor, const double* outputs,
                           Innovation& innovation) const noexcept;
   /// What the filter has just used of the outputs. `excess`: squares of innovations have been so many times what was
-  /// expected. `counts`: the sample is one of those in which time is counted.
-  void take(const WalkingFilter& filter, double excess, bool counts = true) noexcept;
+  /// expected. `whiteness` (n_y, or none): of the output's sensor, null where it is not watched; errors that last for
+  /// some samples are not mistaken for one that is constant. `counts`: the sample is one of those in which time is
+  /// counted.
+  void take(const WalkingFilter& filter, double excess, std::span<const InnovationWhiteness* const> whiteness = {},
+            bool counts = true) noexcept;
   /// Whether innovations say that an output is off, or has come back.
   bool has_suspect() const noexcept { return suspect_ >= 0 || refuted_ >= 0; }
   /// Adopts that offset; the filter becomes what it would be without it.
@@ -118,9 +123,10 @@ class OffsetWatch {
     }
   };
   struct Onset {
-    int watched = -1;       ///< -1: none
-    int age = 0;            ///< [samples that count]
-    double excess = 1.0;    ///< of innovations when it began
+    int watched = -1;                        ///< -1: none
+    int age = 0;                             ///< [samples that count]
+    double excess = 1.0, correlation = 1.0;  ///< of innovations when it began
+    std::size_t first = 0;                   ///< so many innovations of its sensor were known then
     double left_out = 0.0;  ///< of the first one's square by its variance, since it counts as no more than it may
   };
   struct Known {
@@ -135,7 +141,7 @@ class OffsetWatch {
     return {information_[lane], score_[lane], squares_[lane], count_[lane]};
   }
   void set(int lane, const Constant& constant) noexcept;
-  void begin(int watched, double excess, double left_out) noexcept;
+  void begin(int watched, const Onset& onset) noexcept;
   bool has_young(int watched) const noexcept;
   void note(const WalkingFilter& filter, int output, const KalmanFilter::Use& use) noexcept;
   void adopt_lane(int lane, WalkingFilter& filter) noexcept;

@@ -295,7 +295,7 @@ class Mixture {
 
 PriorSmoothing::PriorSmoothing(std::shared_ptr<const Model> model, std::shared_ptr<Solver> solver, Setup setup)
     : model_(std::move(model)), solver_(std::move(solver)), setup_(std::move(setup)) {
-  BankEstimation(model_, setup_.filters);  // reports mistakes now
+  [[maybe_unused]] const BankEstimation checked(model_, setup_.filters);  // reports mistakes now
   const auto np = static_cast<std::size_t>(model_->parameter_count());
   if (setup_.filters.parameter_lower.size() != np || setup_.filters.parameter_upper.size() != np)
     throw Error(fmt::format("smoother: expected {} lower and upper bounds, one a parameter", np));

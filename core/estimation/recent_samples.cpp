@@ -88,6 +88,12 @@ int RecentSamples::with_positions(int positions) noexcept {
   return 0;
 }
 
+int RecentSamples::since_position() noexcept {
+  for (int ago = 0; ago < connected(); ++ago)
+    if (entry(ago).has_position) return ago;
+  return 0;
+}
+
 int RecentSamples::behind(double time) noexcept {
   for (int ago = 0; ago < known(); ++ago)
     if (entry(ago).time <= time) return ago;

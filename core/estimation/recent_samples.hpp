@@ -90,6 +90,8 @@ class RecentSamples {
   /// How many of the newest entries it takes to have so many positions, used or rejected, and what was known before;
   /// 0: so many are not remembered.
   int with_positions(int positions) noexcept;
+  /// How many lie behind the newest one with a position; 0: none do, or such a one is not remembered.
+  int since_position() noexcept;
   /// How many lie behind a time; -1: all that are left, so that nothing is known of it.
   int behind(double time) noexcept;
   /// How many begin at a time, or behind it.

@@ -25,7 +25,7 @@ constexpr int fresh = 2;
 constexpr double probable = 0.9;
 constexpr double even = 0.5;  // where it is as probable as that the sensor has jumped
 // Slip that has jumped within an interval displaces the vehicle by at least this share of it on the next one again.
-constexpr double goes_on_by = 0.8;
+constexpr double goes_on_by = 0.5;
 // So many samples behind slip that was found to have jumped what is disputed may be the same that it was.
 constexpr int soon = 1;
 // Slip that has changed within the gates has done so by this many measured positions ago.
@@ -42,17 +42,50 @@ void go_on_from(const WalkingFilter& from, WalkingFilter& filter) noexcept {
 
 }  // namespace
 
+/// What a position disputes has happened since the last one, of which samples of quicker sensors say little.
 void SensorWatch::start(Hypothesis& hypothesis) noexcept {
   hypothesis.is_active = true;
   hypothesis.explained = 0;
-  hypothesis.filter.mean() = memory_->before_mean;
-  hypothesis.filter.covariance() = memory_->before_covariance;
-  if (&hypothesis == slip_.get()) {
-    slip_->filter.restart_parameters(setup_.parameter_sigmas);
-    slip_->filter.predict(input_.data(), memory_->duration);
+  const bool is_slip = &hypothesis == slip_.get();
+  const int back = is_position_disputed() ? memory_->recent->since_position() : 0;
+  if (is_slip) memory_->is_slip_near = back > 0;
+  if (back > 0) {
+    if (is_slip) {
+      // Over a long interval what a position says of slip is far from linear, unless slip is nearly right already.
+      replay_with_new_slip(back, nullptr);
+      slip_->filter.update(weighed(raw_.data()));
+      memory_->near_slip = slip_->filter.mean().tail(std::ssize(setup_.walk));
+      memory_->slip_beyond = replay_with_new_slip(back, memory_->near_slip.data());
+      return;
+    }
+    memory_->recent->go_back(back, hypothesis.filter);
+    memory_->recent->replay(back, hypothesis.filter, [&](const RecentSamples::Entry& entry) {
+      hypothesis.filter.update(entry.outputs.measured());
+    });
   } else {
-    blind_->filter.predict(believed_input_.data(), memory_->duration);
+    hypothesis.filter.mean() = memory_->before_mean;
+    hypothesis.filter.covariance() = memory_->before_covariance;
+    if (is_slip) hypothesis.filter.restart_parameters(setup_.parameter_sigmas);
   }
+  hypothesis.filter.predict(is_slip ? input_.data() : believed_input_.data(), memory_->duration);
+}
+
+/// Slip is made anew so many entries ago, near a value (n_p; null: what it was), and what has been measured since used
+/// with it. By how many of its standard deviations it would have to leave its bounds for that.
+double SensorWatch::replay_with_new_slip(int back, const double* near) noexcept {
+  WalkingFilter& filter = slip_->filter;
+  memory_->recent->go_back(back, filter);
+  if (near) std::copy_n(near, setup_.walk.size(), filter.mean().tail(std::ssize(setup_.walk)).data());
+  filter.restart_parameters(setup_.parameter_sigmas);
+  double beyond = 0.0;
+  memory_->recent->replay(back, filter, [&](const RecentSamples::Entry& entry) {
+    copy_numbers(filter.mean(), memory_->before_slip);
+    filter.update(entry.outputs.measured());
+    beyond = std::max(beyond, Memory::slip_beyond_bounds(filter, memory_->before_slip, setup_.noise));
+  });
+  filter.predict(input_.data(), memory_->duration);
+  memory_->jumps[0] = memory_->recent->entry(back).time;
+  return beyond;
 }
 
 /// The states that disputed sensors see are known anew: the position if it is among them, else all of them. One that
@@ -244,19 +277,7 @@ bool SensorWatch::consider_slip_before() noexcept {
   for (const int positions : changed_before) {
     const int back = memory_->recent->with_positions(positions);
     if (back == 0) return false;
-    WalkingFilter& filter = slip_->filter;
-    memory_->recent->go_back(back, filter);
-    filter.restart_parameters(setup_.parameter_sigmas);
-    double beyond = 0.0;
-    memory_->recent->replay(back, filter, [&](const RecentSamples::Entry& entry) {
-      copy_numbers(filter.mean(), memory_->before_slip);
-      filter.update(entry.outputs.measured());
-      beyond = std::max(beyond, Memory::slip_beyond_bounds(filter, memory_->before_slip, setup_.noise));
-    });
-    filter.predict(input_.data(), memory_->duration);
-    if (beyond > unlikely_slip || !fits(filter, raw_.data())) continue;
-    memory_->jumps[0] = memory_->recent->entry(back).time;
-    return true;
+    if (replay_with_new_slip(back, nullptr) <= unlikely_slip && fits(slip_->filter, raw_.data())) return true;
   }
   return false;
 }
@@ -271,15 +292,19 @@ double SensorWatch::consider_slip() noexcept {
   };
   double new_likelihood = Memory::unknown;
   if (is_new) {
+    memory_->jumps[0] = memory_->recent->keep_newest();
     start(*slip_);
     held_count_ = 0;
     memory_->jump_count = 1;
-    memory_->jumps[0] = memory_->recent->keep_newest();
     const bool explains = disputed_nis(slip_->filter) <= left_unexplained * disputed_nis(own_->filter) &&
                           fits(slip_->filter, raw_.data());
-    if (!explains && !consider_slip_before()) {
-      refute(*slip_);
-      return new_likelihood;
+    if (!explains) {
+      beyond = 0.0;
+      memory_->is_slip_near = false;
+      if (!consider_slip_before()) {
+        refute(*slip_);
+        return new_likelihood;
+      }
     }
     if (disputed_samples_ <= fresh && explains) new_likelihood = likelihood(slip_->filter, true);
   } else if (!fits(slip_->filter, raw_.data()) && goes_on()) {
@@ -366,12 +391,13 @@ SensorWatch::Finding SensorWatch::settle(double time, const double* outputs) noe
     // What has explained much, or follows a gap, is not doubted for what comes next.
     const bool is_doubtful = slip_->explained < setup_.proof &&
                              std::ranges::none_of(records_, [](const Record& each) { return each.after_gap; });
-    memory_->since_release = is_doubtful ? 0 : soon;
+    memory_->since_release = memory_->is_slip_near ? soon + 1 : is_doubtful ? 0 : soon;
     memory_->released = {memory_->jumps[0], memory_->disputed_from, memory_->retracted.data()};
     accept(*slip_);
     for (Record& record : records_) record = {};
     acquit(outputs);
-    return {.release = true};
+    // A method that is linear about slip as it was before would be wrong over a long interval.
+    return {.release = true, .rebase = memory_->is_slip_near};
   }
   if (slip_->is_active) hold_back(time, outputs);
   bool after_gap = true;

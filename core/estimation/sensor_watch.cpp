@@ -179,6 +179,7 @@ SensorWatch::SensorWatch(std::shared_ptr<const Model> model, const Setup& setup)
   memory_->before_mean = Eigen::VectorXd::Zero(n);
   memory_->before_covariance = Eigen::MatrixXd::Zero(n, n);
   memory_->away = memory_->before_update = memory_->before_slip = memory_->before_mean;
+  memory_->near_slip = Eigen::VectorXd::Zero(model->parameter_count());
   memory_->factor = memory_->before_covariance;
   memory_->recent = std::make_unique<RecentSamples>(own_->filter);
   memory_->replayed = MeasuredOutputs(model->output_count());
@@ -221,6 +222,9 @@ void SensorWatch::reset() noexcept {
   memory_->has_advanced = false;
   memory_->offsets->reset();
   memory_->whiteness.assign(setup_.whiteness ? sensors_.size() : 0, {});
+  memory_->whiteness_of.assign(static_cast<std::size_t>(own_->filter.model().output_count()), nullptr);
+  for (std::size_t s = 0; s < memory_->whiteness.size(); ++s)
+    for (const int j : sensors_[s].outputs) memory_->whiteness_of[static_cast<std::size_t>(j)] = &memory_->whiteness[s];
   if (setup_.initial_covariance.size() > 0) {
     own_->filter.mean() = setup_.initial_mean;
     own_->filter.covariance() = setup_.initial_covariance;
@@ -441,7 +445,8 @@ SensorWatch::Finding SensorWatch::judge_each(double time, double* outputs) noexc
       end_dispute();
       finding.rebase = true;
     }
-    memory_->offsets->take(filter, std::max(1.0, *std::ranges::max_element(excesses_)), memory_->is_counted);
+    memory_->offsets->take(filter, std::max(1.0, *std::ranges::max_element(excesses_)), memory_->whiteness_of,
+                           memory_->is_counted);
     const bool is_told = told >= 0 && memory_->offsets->probable() == told;
     const bool is_found = !is_disputed && memory_->offsets->has_suspect();
     if (is_told) {

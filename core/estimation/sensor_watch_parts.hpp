@@ -108,7 +108,8 @@ struct SensorWatch::Memory {
   double slip_beyond = 0.0;
   StuckValues stuck;
   std::unique_ptr<OffsetWatch> offsets;
-  std::vector<InnovationWhiteness> whiteness;  ///< by sensor; empty: not watched
+  std::vector<InnovationWhiteness> whiteness;            ///< by sensor; empty: not watched
+  std::vector<const InnovationWhiteness*> whiteness_of;  ///< by output; null: not watched
   double covariance_factor = 1.0;
   double typical_volume = 0.0, volumes = 0.0;  ///< mean log sqrt(det P) over so many estimates
   void note_whiteness(double volume, Eigen::Index size) noexcept;
@@ -133,6 +134,8 @@ struct SensorWatch::Memory {
   Eigen::VectorXd away;              ///< of slip that has jumped from an estimate
   Eigen::VectorXd before_update;     ///< the mean
   Eigen::VectorXd before_slip;       ///< that of slip that may have jumped
+  Eigen::VectorXd near_slip;         ///< n_p, what such slip is nearly
+  bool is_slip_near = false;         ///< it began from that
   /// By how much measurements ask for slip beyond its bounds: a cumulative sum of standard deviations (Page 1954).
   double beyond_bounds = 0.0;
   int impossible_samples = 0;  ///< in a row in which that sum was too large

@@ -50,7 +50,7 @@ SmootherSection::SmootherSection(std::shared_ptr<const RobotContext> context, co
   if (!options_.blocking.is_null() && BlockingSection(context_, options_.blocking).blocks_noise())
     throw options_.blocking.error(
         "found blocks of process noise; a smoother estimates it on each interval: expected parameters alone");
-  PriorsSection(context_, options_.priors);
+  [[maybe_unused]] const PriorsSection checked(context_, options_.priors);
   if (!options_.blocking.is_null() && !options_.priors.is_null())
     throw options_.priors.error(
         "a smoother has either blocks or priors; take out 'smoother.blocking', or 'smoother.priors'");

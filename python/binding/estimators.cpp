@@ -291,7 +291,7 @@ void bind_estimates(py::module_& module) {
 
 void bind_estimators(py::module_& module) {
   bind_estimates(module);
-  py::class_<EstimatorObject, EstimatorHandle>(module, "EstimatorBase");
+  [[maybe_unused]] const py::class_<EstimatorObject, EstimatorHandle> base(module, "EstimatorBase");
   py::class_<NamedEstimator, EstimatorObject, std::shared_ptr<NamedEstimator>>(
       module, "Estimator",
       "Estimates state and slip: push stamped measurements and inputs, and ask for the estimate at a time.\n\n"

@@ -245,7 +245,7 @@ Path make_path(const ScenarioOptions& options) {
                   : path.name == PathOptions::Name::zigzag ? "leg_length"
                                                            : "row_length",
                   waypoints, path.spacing);
-  return {std::move(waypoints),
+  return {waypoints,
           {.acceleration = path.acceleration, .lateral_acceleration = path.lateral_acceleration.value_or(infinity)}};
 }
 

@@ -208,6 +208,28 @@ TEST(QuickEncoders, DoNotMakeTheJudgeForget) {
       }
 }
 
+/// What happens between two fixes shows in the next one, and hardly in the samples of an encoder that come between: a
+/// second of wheels that spin is metres, and turns the vehicle.
+TEST(QuickEncoders, DoNotHideSlipThatJumpsBetweenFixes) {
+  const Fault spin{.name = "Spin", .length = 4.0, .spoil = {}, .lost_speed = 0.5};
+  for (const char* estimator : {"ekf", "bank", "rhe"})
+    for (const double lateness : {0.0, 0.17})
+      for (const int encoder_ticks : {1, 5}) {
+        SCOPED_TRACE(fmt::format("{}, {} s late, an angle every {} s", estimator, lateness, 0.01 * encoder_ticks));
+        const Result result =
+            drive(estimator, {.lateness = lateness, .ticks = 100, .encoder_ticks = encoder_ticks}, spin);
+        const auto after = static_cast<std::size_t>((fault_begins + spin.length + 4.0) / asked_every);
+        int ok = 0, samples = 0;
+        for (std::size_t k = 100; k < result.samples.size(); ++k) {
+          EXPECT_LT(result.samples[k].error, k < after ? 6.0 : 0.5) << k;
+          if (k < after) continue;
+          ++samples;
+          ok += result.samples[k].health == HealthLevel::ok;
+        }
+        EXPECT_GT(ok, 0.8 * samples);
+      }
+}
+
 /// Nobody is told how slow a receiver is, nor how late it and the inputs are: that is no reason for doubt.
 TEST(SlowReceivers, ThatAreLateAreNoReasonForDoubt) {
   for (const char* estimator : {"ekf", "bank", "rhe"})

@@ -94,6 +94,40 @@ TEST(InnovationWhiteness, ALargeOneThatIsAloneChangesLittle) {
   EXPECT_LT(whiteness.factor(), 1.3);
 }
 
+/// Of white innovations that are off by a constant since some time, or by more and more, sums are larger for that
+/// reason only; of correlated ones they are larger whatever is taken out.
+TEST(InnovationWhiteness, AConstantIsNoCorrelation) {
+  constexpr int sequences = 20, before = 150, count = 120;
+  double constant = 0.0, of_late = 0.0, slope = 0.0, correlated = 0.0, correlated_of_late = 0.0;
+  for (unsigned seed = 0; seed < sequences; ++seed) {
+    InnovationWhiteness always, stepped, sloping, lasting;
+    EXPECT_EQ(always.correlation(), 1.0);
+    EXPECT_EQ(always.correlation_of_last(100), 1.0);
+    Sequence white(seed, 0.0), same(seed, 0.0), once_more(seed, 0.0), coloured(seed, 0.8);
+    for (int k = 0; k < before + count; ++k) {
+      Innovation off = white.next(), later = same.next(), more = once_more.next();
+      off.value += white.root * Eigen::Vector2d(1.0, -0.5);
+      if (k >= before) later.value += same.root * Eigen::Vector2d(1.0, 1.0);
+      if (k >= before) more.value += (k - before) / 40.0 * (same.root * Eigen::Vector2d(1.0, 0.0));
+      always.take(off, 2);
+      stepped.take(later, 2);
+      sloping.take(more, 2);
+      lasting.take(coloured.next(), 2);
+    }
+    EXPECT_GT(always.factor(), 10.0);
+    constant += always.correlation() / sequences;
+    of_late += stepped.correlation_of_last(count) / sequences;
+    slope += sloping.correlation_of_last(count) / sequences;
+    correlated += lasting.correlation() / sequences;
+    correlated_of_late += lasting.correlation_of_last(count) / sequences;
+  }
+  EXPECT_LT(constant, 1.1);
+  EXPECT_LT(of_late, 1.1);
+  EXPECT_LT(slope, 1.1);
+  EXPECT_GT(correlated, 4.0);
+  EXPECT_GT(correlated_of_late, 3.0);
+}
+
 TEST(InnovationWhiteness, WhatIsNoNumberOrIncompleteSaysNothing) {
   InnovationWhiteness whiteness, other;
   Sequence sequence(8, 0.6), same(8, 0.6);

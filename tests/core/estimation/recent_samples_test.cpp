@@ -61,6 +61,7 @@ TEST(RecentSamples, AreOneByOneWhereTheyAreFarApart) {
   EXPECT_EQ(drive.recent.with_positions(1), 10);
   EXPECT_EQ(drive.recent.with_positions(2), 20);
   EXPECT_EQ(drive.recent.with_positions(3), 0);  // nothing is known of what was before
+  EXPECT_EQ(drive.recent.since_position(), 9);
   EXPECT_EQ(drive.recent.behind(drive.time), 0);
   EXPECT_EQ(drive.recent.behind(drive.time - 0.25), 3);
   EXPECT_EQ(drive.recent.behind(-1.0), -1);
@@ -69,6 +70,7 @@ TEST(RecentSamples, AreOneByOneWhereTheyAreFarApart) {
   EXPECT_EQ(drive.recent.known(), 30);
   EXPECT_EQ(drive.recent.connected(), 0);
   EXPECT_EQ(drive.recent.with_positions(1), 0);
+  EXPECT_EQ(drive.recent.since_position(), 0);
 }
 
 /// However quick the other sensors are, so many positions are remembered.

@@ -151,7 +151,7 @@ class RHEC_EXPORT SensorWatch {
   void confront(Hypothesis& hypothesis, const double* outputs, bool counts) noexcept;
   Finding settle(double time, const double* outputs) noexcept;
   Finding accept(Hypothesis&hypothesis) noexcept, come_back() noexcept;
-  double consider_slip() noexcept;
+  double consider_slip() noexcept, replay_with_new_slip(int back, const double*near) noexcept;
   bool retract_slip() noexcept, replay_without(const Suspicion&suspicion, WalkingFilter&filter, bool change) noexcept;
   Finding accuse(const Suspicion& suspicion, const Record& error, const double* outputs) noexcept;
   bool consider_other(const double* outputs, Finding& finding) noexcept;
