@@ -153,7 +153,8 @@ bool OffsetWatch::has_young(int watched) const noexcept {
 }
 
 /// Where there is no room, the onset gives way that explains the least; the one that explains the most stays.
-void OffsetWatch::begin(int watched, const Onset& onset) noexcept {
+void OffsetWatch::begin(const Onset& onset) noexcept {
+  const int watched = onset.watched;
   std::size_t least = onsets_.size();
   const auto worth = [this](std::size_t m) {
     return onsets_[m].watched < 0 || onsets_[m].age > oldest ? -1.0 : constant(static_cast<int>(m)).explained();
@@ -260,11 +261,11 @@ void OffsetWatch::take(const WalkingFilter& filter, double excess,
     const double square = use.innovation * use.innovation / use.variance;
     const bool is_strange = square > strange * strange;
     if (const int k = watched_of_[j]; k >= 0 && (is_strange || !has_young(k)))
-      begin(k, {.watched = k,
-                .excess = excess,
-                .correlation = correlation_of(k),
-                .first = whiteness_of(k) ? whiteness_of(k)->count() : 0,
-                .left_out = std::max(0.0, square - most_counted * most_counted)});
+      begin({.watched = k,
+             .excess = excess,
+             .correlation = correlation_of(k),
+             .first = whiteness_of(k) ? whiteness_of(k)->count() : 0,
+             .left_out = std::max(0.0, square - most_counted * most_counted)});
     note(filter, j, use);
   }
   suspect_ = refuted_ = candidate_ = -1;
@@ -310,8 +311,10 @@ void OffsetWatch::take(const WalkingFilter& filter, double excess,
       known && !is_end && candidate_ >= std::ssize(outputs_)) {
     const Onset& onset = onsets_[candidate_];
     most *= std::min(1.0, onset.correlation / known->correlation_of_last(known->count() - onset.first));
-    if (!(most > improbable)) candidate_ = -1;
-    if (candidate_ < 0) return;
+    if (!(most > improbable)) {
+      candidate_ = -1;
+      return;
+    }
   }
   const bool is_measured = filter.use(outputs_[watched]).variance > 0.0;
   if (is_measured && most > (is_end ? improbable : limit_)) suspect_ = candidate_;

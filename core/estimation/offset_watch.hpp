@@ -141,7 +141,7 @@ class OffsetWatch {
     return {information_[lane], score_[lane], squares_[lane], count_[lane]};
   }
   void set(int lane, const Constant& constant) noexcept;
-  void begin(int watched, const Onset& onset) noexcept;
+  void begin(const Onset& onset) noexcept;
   bool has_young(int watched) const noexcept;
   void note(const WalkingFilter& filter, int output, const KalmanFilter::Use& use) noexcept;
   void adopt_lane(int lane, WalkingFilter& filter) noexcept;
