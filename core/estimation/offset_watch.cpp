@@ -65,10 +65,11 @@ OffsetWatch::OffsetWatch(const Model& model, const std::vector<Watched>& outputs
     watched_of_[each.output] = static_cast<int>(outputs_.size());
     outputs_.push_back(each.output);
     rivals_.push_back(each.rival);
+    searched_.push_back(each.is_searched);
     biases_.push_back(each.bias);
     first_slot_.push_back(is_single ? first_shared : slots);
-    slots_.push_back(is_single ? most_onsets : onsets_of_rivals);
-    if (!is_single) slots += onsets_of_rivals;
+    slots_.push_back(!each.is_searched ? 0 : is_single ? most_onsets : onsets_of_rivals);
+    if (!is_single) slots += slots_.back();
   }
   for (const Watched& each : outputs) {
     const Variable& about = model.description().outputs[static_cast<std::size_t>(each.output)];
@@ -78,7 +79,7 @@ OffsetWatch::OffsetWatch(const Model& model, const std::vector<Watched>& outputs
   const Eigen::Index n = model.state_count() + model.parameter_count(), needed = lane_of_known(outputs_.size()),
                      lanes = (needed + block - 1) / block * block;
   sensitivities_.columns = KalmanFilter::Deviations::Columns::Zero(n, lanes);
-  for (auto* each : {&information_, &score_, &squares_, &count_}) *each = Eigen::ArrayXd::Zero(lanes);
+  for (auto* each : {&information_, &score_, &squares_, &count_, &is_sure_}) *each = Eigen::ArrayXd::Zero(lanes);
   is_off_ = Eigen::ArrayXXd::Zero(lanes, model.output_count());
   for (std::size_t k = 0; k < outputs_.size(); ++k) is_off_(lane_of_known(k), outputs_[k]) = 1.0;
   reset();
@@ -99,7 +100,7 @@ void OffsetWatch::set(int lane, const Constant& constant) noexcept {
 
 void OffsetWatch::forget_onsets() noexcept {
   for (std::size_t m = 0; m < onsets_.size(); ++m) {
-    const bool is_ever = m < outputs_.size();
+    const bool is_ever = m < outputs_.size() && searched_[m];
     onsets_[m] = {.watched = is_ever ? static_cast<int>(m) : -1, .age = 0};
     set(static_cast<int>(m), {});
     is_off_.row(static_cast<Eigen::Index>(m)).setZero();
@@ -108,6 +109,7 @@ void OffsetWatch::forget_onsets() noexcept {
   // An offset that has always been there goes on as before.
   sensitivities_.columns.rightCols(sensitivities_.columns.cols() - std::ssize(outputs_)).setZero();
   suspect_ = refuted_ = candidate_ = -1;
+  for (std::size_t k = 0; k < known_.size(); ++k) is_sure_[lane_of_known(k)] = known_[k].is_sure ? 1.0 : 0.0;
   find_used_lanes();
 }
 
@@ -129,10 +131,16 @@ bool OffsetWatch::has_any() const noexcept {
   return std::ranges::any_of(known_, [](const Known& each) { return each.is_off; });
 }
 
-bool OffsetWatch::Known::is_recent() const noexcept { return is_off && age <= oldest; }
+bool OffsetWatch::Known::is_recent() const noexcept { return is_off && !is_sure && age <= oldest; }
 
 bool OffsetWatch::has_recent() const noexcept {
   return std::ranges::any_of(known_, [](const Known& each) { return each.is_recent(); });
+}
+
+bool OffsetWatch::has_any_but(const std::vector<int>& outputs) const noexcept {
+  for (std::size_t k = 0; k < known_.size(); ++k)
+    if (known_[k].is_off && std::ranges::find(outputs, outputs_[k]) == outputs.end()) return true;
+  return false;
 }
 
 bool OffsetWatch::is_significant(std::size_t watched) const noexcept {
@@ -179,7 +187,8 @@ void OffsetWatch::begin(const Onset& onset) noexcept {
 }
 
 /// What an output that has been used says of all constants.
-void OffsetWatch::note(const WalkingFilter& filter, int output, const KalmanFilter::Use& use) noexcept {
+void OffsetWatch::note(const WalkingFilter& filter, int output, const KalmanFilter::Use& use,
+                       double correlation) noexcept {
   const int n = static_cast<int>(sensitivities_.columns.rows()), nx = filter.model().state_count();
   const double most = most_counted * std::sqrt(use.variance), inverse = 1.0 / use.variance,
                counted = std::min(std::max(use.innovation, -most), most), square = counted * counted * inverse;
@@ -191,7 +200,8 @@ void OffsetWatch::note(const WalkingFilter& filter, int output, const KalmanFilt
     Lanes g = is_off_.col(output).segment<block>(first);
     for (int c = 0; c < nx; ++c)
       if (const double by = filter.derivative(output, c); by != 0.0) g -= by * sensitivity(c);
-    const Lanes weighted = g * inverse;
+    // Errors of another receiver that last say less of by how much this one has moved than as many independent ones.
+    const Lanes weighted = g * inverse * (1.0 - at(is_sure_, first) * (1.0 - 1.0 / correlation));
     at(information_, first) += g * weighted;
     at(score_, first) += counted * weighted;
     at(squares_, first) += square;
@@ -249,24 +259,28 @@ void OffsetWatch::take(const WalkingFilter& filter, double excess,
     if (whiteness.empty() || rivals_[watched] < 0) return nullptr;
     return whiteness[static_cast<std::size_t>(outputs_[watched])];
   };
-  const auto correlation_of = [&](int watched) {
-    const InnovationWhiteness* known = whiteness_of(watched);
+  const auto correlation_by = [](const InnovationWhiteness* known) {
     if (!known) return 1.0;
     const double unknown = std::max(0.0, 1.0 - static_cast<double>(known->count()) / innovations_to_know);
     return std::max(known->correlation(), 1.0 + unknown * (correlation_of_receivers - 1.0));
+  };
+  const auto correlation_of = [&](int watched) { return correlation_by(whiteness_of(watched)); };
+  const bool has_sure = is_sure_.maxCoeff() > 0.0;
+  const auto correlation_of_output = [&](int output) {
+    return has_sure && !whiteness.empty() ? correlation_by(whiteness[static_cast<std::size_t>(output)]) : 1.0;
   };
   for (int j = 0; j < filter.model().output_count(); ++j) {
     const KalmanFilter::Use use = filter.use(j);
     if (!(use.variance > 0.0)) continue;
     const double square = use.innovation * use.innovation / use.variance;
     const bool is_strange = square > strange * strange;
-    if (const int k = watched_of_[j]; k >= 0 && (is_strange || !has_young(k)))
+    if (const int k = watched_of_[j]; k >= 0 && searched_[k] && (is_strange || !has_young(k)))
       begin({.watched = k,
              .excess = excess,
              .correlation = correlation_of(k),
              .first = whiteness_of(k) ? whiteness_of(k)->count() : 0,
              .left_out = std::max(0.0, square - most_counted * most_counted)});
-    note(filter, j, use);
+    note(filter, j, use, correlation_of_output(j));
   }
   suspect_ = refuted_ = candidate_ = -1;
   for (std::size_t k = 0; k < known_.size(); ++k) {
@@ -335,23 +349,34 @@ bool OffsetWatch::can_be_off(int output, double change, double variance) const n
          change * change > lasting * variance;
 }
 
-bool OffsetWatch::is_right_again(int output, const Innovation& innovation) const noexcept {
-  const int k = watched_of_[static_cast<std::size_t>(output)];
-  if (k < 0 || innovation.value.size() != 1) return false;
-  const auto watched = static_cast<std::size_t>(k);
-  if (!known_[watched].is_off || rivals_[watched] >= 0) return false;
-  const double rest = innovation.value[0] + known_[watched].value + constant(lane_of_known(watched)).value();
-  return rest * rest < negligible * negligible * innovation.covariance(0, 0);
+bool OffsetWatch::is_right_again(const std::vector<int>& outputs, const Innovation& innovation) const noexcept {
+  if (innovation.value.size() != std::ssize(outputs)) return false;
+  Innovation::OfSensor<1> rest = innovation.value;
+  bool is_any = false;
+  for (Eigen::Index i = 0; i < rest.size(); ++i) {
+    const int k = watched_of_[static_cast<std::size_t>(outputs[static_cast<std::size_t>(i)])];
+    if (k < 0 || !known_[static_cast<std::size_t>(k)].is_off) continue;
+    const auto watched = static_cast<std::size_t>(k);
+    if (rivals_[watched] >= 0 && !known_[watched].is_sure) return false;
+    rest[i] += known_[watched].value + constant(lane_of_known(watched)).value();
+    is_any = true;
+  }
+  const double most = negligible * negligible * static_cast<double>(rest.size());
+  return is_any && squared_size(rest, innovation.covariance) < most;
 }
 
-void OffsetWatch::end(int output, WalkingFilter& filter) noexcept {
-  const auto k = static_cast<std::size_t>(watched_of_[static_cast<std::size_t>(output)]);
-  const Constant error = constant(lane_of_known(k));
-  const auto sensitivity = sensitivities_.columns.col(lane_of_known(k));
-  filter.mean() -= sensitivity * error.value();
+void OffsetWatch::end(const std::vector<int>& outputs, WalkingFilter& filter) noexcept {
+  for (const int output : outputs) {
+    const int watched = watched_of_[static_cast<std::size_t>(output)];
+    if (watched < 0 || !known_[static_cast<std::size_t>(watched)].is_off) continue;
+    const auto k = static_cast<std::size_t>(watched);
+    const Constant error = constant(lane_of_known(k));
+    const auto sensitivity = sensitivities_.columns.col(lane_of_known(k));
+    filter.mean() -= sensitivity * error.value();
+    add_square(sensitivity, 1.0 / error.information, filter.covariance());
+    known_[k] = {};
+  }
   clip(filter.mean().tail(std::ssize(parameter_lower_)));
-  add_square(sensitivity, 1.0 / error.information, filter.covariance());
-  known_[k] = {};
   forget_onsets();
 }
 
@@ -379,14 +404,21 @@ void OffsetWatch::adopt_mean(int output, double change, double variance) noexcep
   adopt(output, change, std::max(variance, least * least));
 }
 
-void OffsetWatch::adopt(int output, double change, double variance) noexcept {
+void OffsetWatch::adopt(int output, double change, double variance, bool is_sure) noexcept {
   const auto k = static_cast<std::size_t>(watched_of_[output]);
   Known& known = known_[k];
   known.value += change;
   known.age = 0;
+  known.is_sure = known.is_sure || is_sure;
   set(lane_of_known(k), {.information = 1.0 / variance, .score = 0.0, .squares = 0.0, .count = 0.0});
   known.is_off = known.value * known.value > negligible * negligible * variance;
   if (!known.is_off) known = {};
+  forget_onsets();
+}
+
+void OffsetWatch::forget_receivers() noexcept {
+  for (std::size_t k = 0; k < known_.size(); ++k)
+    if (rivals_[k] >= 0) known_[k] = {};
   forget_onsets();
 }
 
@@ -451,7 +483,7 @@ void OffsetWatch::refine(Estimate& estimate) const noexcept {
     estimate.parameters -= sensitivity.tail(np) * error.value();
     clip(estimate.parameters.head(np));
     add_square(sensitivity, 1.0 / error.information, estimate.covariance);
-    if (rivals_[k] < 0) continue;
+    if (rivals_[k] < 0 || known_[k].is_sure) continue;
     // If the other one is off, the vehicle is where this one says.
     const double squared = known_[k].by_x * known_[k].by_x + known_[k].by_y * known_[k].by_y;
     if (!(squared > 0.0)) continue;

@@ -33,6 +33,8 @@ class OffsetWatch {
     int rival = -1;
     /// The state that is this output's bias and nothing else; -1: none.
     int bias = -1;
+    /// Whether innovations are searched for it; else an offset is only adopted that something else says.
+    bool is_searched = true;
   };
   /// `gate`: standard deviations by which an offset has to differ from none.
   OffsetWatch(const Model& model, const std::vector<Watched>& outputs, const KalmanFilter::Noise& noise, double gate);
@@ -59,21 +61,27 @@ class OffsetWatch {
             bool counts = true) noexcept;
   /// Whether innovations say that an output is off, or has come back.
   bool has_suspect() const noexcept { return suspect_ >= 0 || refuted_ >= 0; }
+  /// The output of which they say that it is off; -1: none.
+  int suspected() const noexcept {
+    return suspect_ < 0 || refuted_ >= 0 ? -1 : outputs_[static_cast<std::size_t>(onsets_[suspect_].watched)];
+  }
   /// Adopts that offset; the filter becomes what it would be without it.
   void adopt_suspected(WalkingFilter& filter) noexcept;
   /// The same of one that is probable, where something else says so, too.
   void adopt_candidate(WalkingFilter& filter) noexcept { adopt_lane(candidate_, filter); }
-  /// Whether an innovation says that an output which was off is right again: it agrees with what the filter expects as
-  /// it was measured, without what is taken out of it.
-  bool is_right_again(int output, const Innovation& innovation) const noexcept;
+  /// Whether an innovation says that a sensor which was off is right again: it agrees with what the filter expects as
+  /// it was measured, without what is taken out of it. Not of outputs of which it is not known whether it is they.
+  bool is_right_again(const std::vector<int>& outputs, const Innovation& innovation) const noexcept;
   /// So it is: the filter becomes what is known with the offset that it had, of which nothing is taken out any more.
-  void end(int output, WalkingFilter& filter) noexcept;
+  void end(const std::vector<int>& outputs, WalkingFilter& filter) noexcept;
   /// Whether an output is watched by itself, and may be off by this much more, which is known well enough.
   bool can_be_off(int output, double change, double variance) const noexcept;
   /// Adopts that. What is not known of it is more than that, as of those that innovations have said.
   void adopt_mean(int output, double change, double variance) noexcept;
-  /// Adopts that the offset of an output has changed by this much, known with a variance.
-  void adopt(int output, double change, double variance) noexcept;
+  /// Adopts that the offset of an output has changed by this much, known with a variance. `is_sure`: of two that
+  /// measure the same it is this one.
+  void adopt(int output, double change, double variance, bool is_sure = false) noexcept;
+  bool is_watched(int output) const noexcept { return watched_of_[static_cast<std::size_t>(output)] >= 0; }
 
   /// An output that is off for good, and has a state for its bias: from then on that state is what it is off by, for
   /// nothing distinguishes them. The filter becomes that. Which output; -1: none.
@@ -85,6 +93,9 @@ class OffsetWatch {
   /// does not know.
   void withdraw_recent(WalkingFilter& filter) noexcept;
 
+  /// Nothing is taken out any more of outputs of the position.
+  void forget_receivers() noexcept;
+
   /// What an output is off by; 0 if it is right.
   double offset(int output) const noexcept {
     const int k = watched_of_[static_cast<std::size_t>(output)];
@@ -93,16 +104,25 @@ class OffsetWatch {
   /// The output that says otherwise, where it is not known which of the two is off; -1: none.
   int rival(int output) const noexcept {
     const int k = watched_of_[static_cast<std::size_t>(output)];
-    return k < 0 ? -1 : rivals_[static_cast<std::size_t>(k)];
+    return k < 0 || known_[static_cast<std::size_t>(k)].is_sure ? -1 : rivals_[static_cast<std::size_t>(k)];
   }
   bool has_any() const noexcept;
+  /// Whether it is known that an output is off, and not its rival; whether there is one.
+  bool is_sure(int output) const noexcept {
+    const int k = watched_of_[static_cast<std::size_t>(output)];
+    return k >= 0 && known_[static_cast<std::size_t>(k)].is_sure;
+  }
+  bool has_sure() const noexcept {
+    return std::ranges::any_of(known_, [](const Known& each) { return each.is_sure; });
+  }
   /// Whether estimates are to be refined: there is one, or one is not improbable.
   bool is_in_doubt() const noexcept { return candidate_ >= 0 || has_any(); }
   /// The output of one that has not said enough yet, and is more probable than not; -1: none.
   int probable() const noexcept {
     return candidate_ >= 0 && probability_ > 0.5 ? outputs_[static_cast<std::size_t>(onsets_[candidate_].watched)] : -1;
   }
-  bool has_recent() const noexcept;  ///< one that was adopted of late
+  bool has_recent() const noexcept;                                  ///< one that was adopted of late
+  bool has_any_but(const std::vector<int>& outputs) const noexcept;  ///< of others than these
   /// Gives an estimate of [x; p] the mean and the covariance that it has if offsets are not known better than they are.
   /// One that is not adopted yet, and the other one of two outputs of which one is off, count with their probability:
   /// the mean stays, and the covariance is the second moment of both answers about it.
@@ -131,7 +151,7 @@ class OffsetWatch {
   };
   struct Known {
     bool is_recent() const noexcept;
-    bool is_off = false;
+    bool is_off = false, is_sure = false;
     int age = 0;  ///< [samples that count]
     double value = 0.0;
     double by_x = 0.0, by_y = 0.0;  ///< derivatives of the output by the position
@@ -143,7 +163,7 @@ class OffsetWatch {
   void set(int lane, const Constant& constant) noexcept;
   void begin(const Onset& onset) noexcept;
   bool has_young(int watched) const noexcept;
-  void note(const WalkingFilter& filter, int output, const KalmanFilter::Use& use) noexcept;
+  void note(const WalkingFilter& filter, int output, const KalmanFilter::Use& use, double correlation) noexcept;
   void adopt_lane(int lane, WalkingFilter& filter) noexcept;
   void widen_by(const WalkingFilter& filter, const Sensor& sensor, const double* outputs, int output, int lane,
                 Innovation& innovation) const noexcept;
@@ -155,10 +175,11 @@ class OffsetWatch {
   void clip(Eigen::VectorXd::SegmentReturnType parameters) const noexcept;
 
   std::vector<int> outputs_, rivals_, biases_;  ///< that are watched
-  std::vector<int> first_slot_, slots_;         ///< by watched output, its places for onsets
-  std::vector<int> watched_of_;                 ///< by output, which of these it is; -1: none
-  std::vector<double> most_offset_;             ///< by watched output
-  int position_x_, position_y_;                 ///< states
+  std::vector<char> searched_;
+  std::vector<int> first_slot_, slots_;  ///< by watched output, its places for onsets
+  std::vector<int> watched_of_;          ///< by output, which of these it is; -1: none
+  std::vector<double> most_offset_;      ///< by watched output
+  int position_x_, position_y_;          ///< states
   std::vector<double> parameter_lower_, parameter_upper_;
   double limit_;
   std::vector<Onset> onsets_;  ///< first those of offsets that have been there for ever, one for each watched output
@@ -166,6 +187,7 @@ class OffsetWatch {
   // Lanes: those of onsets, and then of what is known of watched outputs.
   KalmanFilter::Deviations sensitivities_;  ///< V
   Eigen::ArrayXd information_, score_, squares_, count_;
+  Eigen::ArrayXd is_sure_;           ///< 1 in lanes of offsets of which that is known
   Eigen::ArrayXXd is_off_;           ///< 1 in lanes of an output, by output
   int suspect_ = -1, refuted_ = -1;  ///< an onset; a watched output whose offset is none after all
   int candidate_ = -1;               ///< an onset that has not said enough yet

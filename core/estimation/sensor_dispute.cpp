@@ -11,14 +11,10 @@ namespace rhec {
 
 namespace {
 
-// In typical magnitudes, how far off a state can be that a sensor sees after it has moved.
-constexpr double displacement = 100.0;
 // Samples in a row that measured inputs must fit before they are believed again.
 constexpr int trusted_again = 3;
 // New slip explains what the filter does not only if it leaves less than this share of nu' S^-1 nu.
 constexpr double left_unexplained = 0.5;
-// The logarithm of the odds at which a sensor is followed that does not see the position.
-constexpr double convincing = 4.6;
 // Samples of a dispute within which slip may have jumped.
 constexpr int fresh = 2;
 // With more than this probability what is disputed is slip that has jumped.
@@ -91,14 +87,15 @@ double SensorWatch::replay_with_new_slip(int back, const double* near) noexcept 
 /// The states that disputed sensors see are known anew: the position if it is among them, else all of them. One that
 /// has followed the sensor for some time, until it jumped again, knows more of heading and slip than the estimate,
 /// which has gone on without.
-void SensorWatch::start_moved() noexcept {
-  WalkingFilter& filter = moved_->filter;
-  moved_->begin();
+void SensorWatch::start_moved(Hypothesis& hypothesis) noexcept {
+  WalkingFilter& filter = hypothesis.filter;
+  const bool is_alone = &hypothesis == memory_->double_fault.get();
+  hypothesis.begin();
   const ModelDescription& about = filter.model().description();
-  if (!moved_->is_informed) go_on_from(own_->filter, filter);
+  if (!hypothesis.is_informed || is_alone) go_on_from(own_->filter, filter);
   const auto is_position = [&](int i) { return i == about.roles.position_x || i == about.roles.position_y; };
   for (std::size_t s = 0; s < sensors_.size(); ++s) {
-    if (!(findings_[s] & reason::rejected)) continue;
+    if (!(findings_[s] & reason::rejected) || (is_alone && !sees_position(sensors_[s].outputs))) continue;
     for (const int j : sensors_[s].outputs) {
       for (int i = 0; i < filter.model().state_count(); ++i) {
         if (!own_->filter.depends_on(j, i) || (sees_position(j) && !is_position(i))) continue;
@@ -163,14 +160,14 @@ double SensorWatch::disputed_nis(WalkingFilter& filter) noexcept {
   return sum;
 }
 
-/// Log likelihood of what was measured, or of what of it was not rejected, but for a constant.
-double SensorWatch::likelihood(WalkingFilter& filter, bool with_rejected) noexcept {
+/// Log likelihood of what is not missing of the present sample, but for a constant.
+double SensorWatch::likelihood(WalkingFilter& filter, const double* outputs) noexcept {
   filter.expect();
   double sum = 0.0;
-  for (std::size_t s = 0; s < sensors_.size(); ++s)
-    if ((with_rejected || !(findings_[s] & reason::rejected)) &&
-        filter.innovation(sensors_[s], weighed(raw_.data()), scratch_))
-      sum -= 0.5 * (scratch_.nis + log_determinant(scratch_.covariance));
+  Innovation innovation;
+  for (const Sensor& each : sensors_)
+    if (filter.innovation(each, weighed(outputs), innovation))
+      sum -= 0.5 * (innovation.nis + log_determinant(innovation.covariance));
   return sum;
 }
 
@@ -209,7 +206,8 @@ std::span<const double> SensorWatch::jumps() const noexcept {
 }
 
 void SensorWatch::confront(Hypothesis& hypothesis, const double* outputs, bool counts) noexcept {
-  const bool has_moved = &hypothesis == moved_.get() || &hypothesis == back_.get();
+  const bool has_moved =
+      &hypothesis == moved_.get() || &hypothesis == memory_->double_fault.get() || &hypothesis == back_.get();
   const bool may_change_slip = counts && has_moved && is_position_disputed();
   if (fits(hypothesis.filter, outputs)) {
     hypothesis.filter.update_as_expected(weighed(outputs));
@@ -237,7 +235,10 @@ bool SensorWatch::is_position_disputed() const noexcept {
 
 /// Whether nothing explains a position that is disputed, and no other sensor has said for as long where the vehicle is.
 bool SensorWatch::is_place_lost() const noexcept {
-  return std::min(disputed_samples_, unplaced_samples_) > Memory::hopeless * setup_.proof && is_position_disputed();
+  const int samples = std::min(disputed_samples_, unplaced_samples_), most = Memory::hopeless * setup_.proof;
+  // Of a slow receiver so many samples are too long.
+  const bool is_long = samples > setup_.proof && memory_->now - memory_->unplaced_from > most * setup_.step;
+  return (samples > most || is_long) && is_position_disputed();
 }
 
 bool SensorWatch::sees_position(const std::vector<int>& outputs) const noexcept {
@@ -306,7 +307,7 @@ double SensorWatch::consider_slip() noexcept {
         return new_likelihood;
       }
     }
-    if (disputed_samples_ <= fresh && explains) new_likelihood = likelihood(slip_->filter, true);
+    if (disputed_samples_ <= fresh && explains) new_likelihood = likelihood(slip_->filter, raw_.data());
   } else if (!fits(slip_->filter, raw_.data()) && goes_on()) {
     go_on_from(edge_->filter, slip_->filter);
     copy_numbers(slip_->filter.mean(), memory_->before_slip);
@@ -324,28 +325,37 @@ double SensorWatch::consider_slip() noexcept {
   return new_likelihood;
 }
 
-void SensorWatch::consider_moved(double likelihood_of_new_slip) noexcept {
+void SensorWatch::consider_moved(double likelihood_of_new_slip, const double* outputs) noexcept {
   const bool is_new = !moved_->is_active;
+  consider_double_fault();
   if (is_new) {
     note_jump();
-    start_moved();
+    start_moved(*moved_);
   }
   // As probable before the sample as that slip has jumped.
   if (slip_->is_active && !std::isnan(likelihood_of_new_slip))
-    slip_probability_ = 1.0 / (1.0 + std::exp(likelihood(moved_->filter, true) - likelihood_of_new_slip));
+    slip_probability_ = 1.0 / (1.0 + std::exp(likelihood(moved_->filter, raw_.data()) - likelihood_of_new_slip));
   // Whether the other sensors agree better with a vehicle whose state is what the disputed one says: the position, if
   // there is one, for errors of a quick compass or gyro are the same from sample to sample.
   if (!is_new && !is_position_disputed() && memory_->is_counted)
-    moved_->evidence += likelihood(moved_->filter, false) - likelihood(own_->filter, false);
+    moved_->evidence += likelihood(moved_->filter, outputs) - likelihood(own_->filter, outputs);
   confront(*moved_, raw_.data(), true);
 }
 
-/// The estimate goes along with what is disputed.
-void SensorWatch::note_followed() noexcept {
-  for (std::uint32_t& each : findings_)
-    if (each & reason::rejected) each |= reason::moved;
-  for (std::size_t s = 0; s < sensors_.size(); ++s) states_[s].reasons |= findings_[s] & reason::moved;
-  for (Record& record : records_) record = {};
+/// The estimate goes along with what is disputed, or of that with the position alone.
+void SensorWatch::note_followed(bool alone) noexcept {
+  for (std::size_t s = 0; s < sensors_.size(); ++s) {
+    if (alone && !sees_position(sensors_[s].outputs)) continue;
+    if (findings_[s] & reason::rejected) findings_[s] |= reason::moved;
+    states_[s].reasons |= findings_[s] & reason::moved;
+    records_[s] = {};
+  }
+}
+
+/// Whether a move has explained enough to be followed, and slip that has jumped meanwhile is known again.
+bool SensorWatch::has_proved(const Hypothesis& moved, bool after_gap) const noexcept {
+  const bool is_slip_settled = moved.new_slips == 0 || moved.explained - moved.new_slip_since > setup_.slip_proof;
+  return is_slip_settled && moved.explained >= (after_gap ? setup_.gap_proof : setup_.proof);
 }
 
 SensorWatch::Finding SensorWatch::settle(double time, const double* outputs) noexcept {
@@ -366,12 +376,13 @@ SensorWatch::Finding SensorWatch::settle(double time, const double* outputs) noe
   // Of a compass or gyro the next sample tells: slip that has jumped goes on to turn the vehicle, one that has jumped
   // stays where it is. Both may pass their gates.
   const bool is_told = !is_position_disputed() && slip_->is_active && moved_->is_active;
-  const double favours_moved = is_told ? likelihood(moved_->filter, true) - likelihood(slip_->filter, true) : 0.0;
+  const double favours_moved =
+      is_told ? likelihood(moved_->filter, raw_.data()) - likelihood(slip_->filter, raw_.data()) : 0.0;
   const double likelihood_of_new_slip = consider_slip();
   const bool retracts = retract_slip();
   if (Finding finding; !retracts && consider_other(outputs, finding)) return finding;
   consider_return(time);
-  consider_moved(likelihood_of_new_slip);
+  consider_moved(likelihood_of_new_slip, outputs);
   if (is_told && slip_probability_ > 0.0)
     slip_probability_ = 1.0 / (1.0 + (1.0 / slip_probability_ - 1.0) * std::exp(favours_moved));
   think_again();
@@ -403,16 +414,23 @@ SensorWatch::Finding SensorWatch::settle(double time, const double* outputs) noe
   bool after_gap = true;
   for (std::size_t s = 0; s < sensors_.size(); ++s)
     if (findings_[s] & reason::rejected) after_gap = after_gap && records_[s].after_gap;
-  const bool is_slip_settled = moved_->new_slips == 0 || moved_->explained - moved_->new_slip_since > setup_.slip_proof;
-  if (is_slip_settled && moved_->explained >= (after_gap ? setup_.gap_proof : setup_.proof) &&
-      (may_follow() || moved_->evidence > convincing)) {
+  const bool is_alone = is_double_fault();
+  Hypothesis& moved = is_alone ? *memory_->double_fault : *moved_;
+  if (has_proved(moved, after_gap) && (may_follow() || (!is_alone && moved.evidence > convincing))) {
     leave_place(time, after_gap);
-    note_followed();
-    return accept(*moved_);
+    note_followed(is_alone);
+    const int since = disputed_samples_;
+    const Finding finding = accept(moved);
+    // Slip that jumps now does not explain a sensor that has been wrong for some time.
+    is_disputed_ = is_alone;
+    disputed_samples_ = is_alone ? since : 0;
+    if (is_alone) convict();
+    return finding;
   }
+  if (distrust_receiver()) return {.rebase = true};
   if (memory_->search && is_place_lost()) {
     // Nothing explains what is measured: the position counts, and all else is found anew.
-    start_moved();
+    start_moved(*moved_);
     moved_->filter.update(weighed(raw_.data()));
     moved_->filter.restart_parameters(setup_.parameter_sigmas);
     search_from(moved_->filter, *memory_->search, raw_.data());
@@ -499,7 +517,7 @@ void SensorWatch::think_again() noexcept {
       return;
     }
   }
-  start_moved();
+  start_moved(*moved_);
   moved_->filter.update(weighed(raw_.data()));
   WalkingFilter& trial = *memory_->trial;
   go_on_from(moved_->filter, trial);
@@ -523,7 +541,8 @@ void SensorWatch::end_dispute() noexcept {
   slip_probability_ = 0.0;
   disputed_samples_ = unplaced_samples_ = 0;
   if (memory_->second_thought) memory_->second_thought->cancel();
-  for (Hypothesis* each : {slip_.get(), edge_.get(), moved_.get(), back_.get(), blind_.get()}) {
+  for (Hypothesis* each :
+       {slip_.get(), edge_.get(), moved_.get(), memory_->double_fault.get(), back_.get(), blind_.get()}) {
     each->is_active = each->is_informed = false;
     each->explained = each->refuted = 0;
   }

@@ -146,7 +146,7 @@ bool SensorWatch::changes_slip(Hypothesis& each) noexcept {
 SensorWatch::Finding SensorWatch::come_back() noexcept {
   Memory& memory = *memory_;
   if (memory.place < memory.places.count()) {
-    note_followed();
+    note_followed(false);
     memory.was_return = true;
     memory.places.come_back(memory.place);
   }

@@ -98,6 +98,9 @@ std::vector<OffsetWatch::Watched> watched_outputs(const WalkingFilter& filter, c
   const auto by_x = [&](int output) { return derivative(output, roles.position_x); };
   const auto by_y = [&](int output) { return derivative(output, roles.position_y); };
   const int count = static_cast<int>(about.size());
+  const auto is_same = [&](int j, int k) {
+    return about[j].device != about[k].device && by_x(j) == by_x(k) && by_y(j) == by_y(k);
+  };
   for (int j = 0; j < count; ++j) {
     if (by_x(j) == 0.0 && by_y(j) == 0.0) {
       watched.push_back({.output = j, .bias = bias_of(filter, j)});
@@ -105,11 +108,17 @@ std::vector<OffsetWatch::Watched> watched_outputs(const WalkingFilter& filter, c
     }
     int best = j;
     for (int k = 0; k < count; ++k) {
-      const bool is_same = about[j].device != about[k].device && by_x(j) == by_x(k) && by_y(j) == by_y(k);
       const bool is_better = variances[k] < variances[best] || (variances[k] == variances[best] && k < best);
-      if (is_same && is_better) best = k;
+      if (is_same(j, k) && is_better) best = k;
     }
-    if (best != j) watched.push_back({.output = j, .rival = best});
+    if (best != j) {
+      watched.push_back({.output = j, .rival = best});
+      continue;
+    }
+    for (int k = 0; k < count && best == j; ++k)
+      if (is_same(j, k)) best = k;
+    // The best one may jump.
+    if (best != j) watched.push_back({.output = j, .rival = best, .is_searched = false});
   }
   return watched;
 }
@@ -162,6 +171,7 @@ SensorWatch::SensorWatch(std::shared_ptr<const Model> model, const Setup& setup)
   back_ = make(filter_setup(setup_));
   blind_ = make(blind_setup(*model, setup_));
   memory_ = std::make_unique<Memory>();
+  memory_->double_fault = make(filter_setup(setup_));
   memory_->stuck = StuckValues(setup_.noise.output_variances);
   memory_->trial = std::make_unique<WalkingFilter>(model, filter_setup(setup_));
   memory_->ahead = std::make_unique<WalkingFilter>(model, filter_setup(setup_));
@@ -184,7 +194,7 @@ SensorWatch::SensorWatch(std::shared_ptr<const Model> model, const Setup& setup)
   memory_->recent = std::make_unique<RecentSamples>(own_->filter);
   memory_->replayed = MeasuredOutputs(model->output_count());
   raw_.assign(model->output_count(), Memory::unknown);
-  memory_->first_errors = memory_->retracted = memory_->expected = raw_;
+  memory_->first_errors = memory_->retracted = memory_->expected = memory_->not_accused = raw_;
   input_.assign(model->input_count(), 0.0);
   believed_input_ = input_;
   held_.assign(held_capacity, {0.0, MeasuredOutputs(model->output_count())});
@@ -208,6 +218,7 @@ void SensorWatch::reset() noexcept {
   quiet_.assign(sensors_.size(), 0);
   records_.assign(sensors_.size(), {});
   excesses_.assign(sensors_.size(), 1.0);
+  memory_->accused.assign(sensors_.size(), 0);
   heard_.assign(sensors_.size(), Memory::unknown);
   is_unobserved_ = false;
   usual_volume_ = Memory::unknown;
@@ -292,7 +303,7 @@ void SensorWatch::advance(double duration, const double* inputs, const double* m
     memory_->search->predict(inputs, duration);
     return;
   }
-  for (Hypothesis* each : {moved_.get(), back_.get()})
+  for (Hypothesis* each : {moved_.get(), memory_->double_fault.get(), back_.get()})
     if (each->is_active && !memory_->has_advanced) each->note_before();
   note_motion(duration, inputs);
   memory_->recent->note_inputs(input_);
@@ -310,6 +321,7 @@ void SensorWatch::advance(double duration, const double* inputs, const double* m
   if (slip_->is_active) slip_->filter.predict(inputs, duration);
   if (edge_->is_active) edge_->filter.predict(inputs, duration);
   if (moved_->is_active || moved_->is_informed) moved_->filter.predict(inputs, duration);
+  if (memory_->double_fault->is_active) memory_->double_fault->filter.predict(inputs, duration);
   if (back_->is_active) back_->filter.predict(inputs, duration);
   if (memory_->second_thought && memory_->second_thought->is_active())
     memory_->second_thought->predict(inputs, duration);
@@ -388,7 +400,8 @@ SensorWatch::Finding SensorWatch::judge_each(double time, double* outputs) noexc
     for (const int j : sensors_[s].outputs) outputs[j] = Memory::unknown;
   }
   if (is_blind_) test_inputs(raw_.data());
-  unplaced_samples_ = is_placed ? 0 : unplaced_samples_ + is_disputed;
+  if (is_placed || unplaced_samples_ == 0) memory_->unplaced_from = time;
+  unplaced_samples_ = is_placed ? 0 : unplaced_samples_ + (is_disputed && counted);
   const int told = is_disputed ? offset_in_dispute() : -1;
   if (is_disputed && end_offset()) {
     filter.update(weighed(outputs));
@@ -401,10 +414,11 @@ SensorWatch::Finding SensorWatch::judge_each(double time, double* outputs) noexc
     // What is disputed was not measured.
     for (Hypothesis* each : {slip_.get(), edge_.get(), moved_.get(), back_.get(), blind_.get()})
       if (each->is_active) confront(*each, raw_.data(), false);
+    if (memory_->double_fault->is_active) confront(*memory_->double_fault, not_accused(), false);
   } else if (is_any_measured) {
     // A sensor passes again of which nothing was said: either slip explains that better, or what was held was wrong.
     const bool is_slip = slip_->is_active && fits(slip_->filter, raw_.data()) &&
-                         likelihood(slip_->filter, true) > likelihood(filter, true);
+                         likelihood(slip_->filter, raw_.data()) > likelihood(filter, raw_.data());
     for (std::size_t s = 0; is_disputed_ && memory_->was_open && !is_slip && s < sensors_.size(); ++s) {
       const auto was_held = [&](int j) { return held_count_ > 0 && !std::isnan(held_[0].outputs[j]); };
       if (std::ranges::none_of(sensors_[s].outputs, was_held)) continue;
@@ -449,6 +463,7 @@ SensorWatch::Finding SensorWatch::judge_each(double time, double* outputs) noexc
                            memory_->is_counted);
     const bool is_told = told >= 0 && memory_->offsets->probable() == told;
     const bool is_found = !is_disputed && memory_->offsets->has_suspect();
+    if (is_found && distrust_receiver()) return {.rebase = true};
     if (is_told) {
       memory_->offsets->adopt_candidate(filter);
       std::fill(records_.begin(), records_.end(), Record{});
@@ -551,7 +566,7 @@ bool SensorWatch::admits(std::size_t sensor, const Innovation& innovation) noexc
   const auto degrees = static_cast<double>(innovation.value.size());
   const bool is_kept_out = record.failures > 0 && !record.after_gap && !sees_position(sensors_[sensor].outputs);
   const bool is_off = is_kept_out && is_still_off(sensor, innovation);
-  const bool passes = innovation.nis <= limit(sensor, innovation.value.size()) && !is_off;
+  const bool passes = innovation.nis <= limit(sensor, innovation.value.size()) && !is_off && !passes_by_chance(sensor);
   double& excess = excesses_[sensor];
   if (record.failures < suspect_after)
     excess += (std::min(innovation.nis / degrees, most_excess) - excess) / excess_memory;
@@ -559,10 +574,11 @@ bool SensorWatch::admits(std::size_t sensor, const Innovation& innovation) noexc
     if (record.failures == 0) {
       record.after_gap = comes_back;
       record.since = memory_->now;
+      record.place = position_of(own_->filter);
     }
     const auto size = static_cast<std::size_t>(innovation.value.size());
     record.note_failure(innovation, limits_[size], close_limits_[size]);
-    const bool is_right_again = memory_->offsets->is_right_again(sensors_[sensor].outputs.front(), innovation);
+    const bool is_right_again = memory_->offsets->is_right_again(sensors_[sensor].outputs, innovation);
     record.right_again = is_right_again ? record.right_again + 1 : 0;
     return false;
   }
@@ -578,7 +594,7 @@ bool SensorWatch::end_offset() noexcept {
   bool is_any = false;
   for (std::size_t s = 0; s < sensors_.size(); ++s) {
     if (records_[s].right_again < passes_of_suspects) continue;
-    memory_->offsets->end(sensors_[s].outputs.front(), own_->filter);
+    memory_->offsets->end(sensors_[s].outputs, own_->filter);
     records_[s] = {};
     is_any = true;
   }
@@ -596,18 +612,18 @@ bool SensorWatch::follow_biases(WalkingFilter& filter) noexcept {
   for (Record& record : records_)
     if (memory_->is_counted && record.failures > 0) record.note_time(close_limits_[1]);
   const auto is_wrong = [](std::uint32_t finding) { return finding != 0; };
-  if (is_position_disputed() || input_findings_ != 0 || std::ranges::count_if(findings_, is_wrong) != 1) return false;
+  if (input_findings_ != 0 || std::ranges::count_if(findings_, is_wrong) != 1) return false;
+  if (is_position_disputed()) return follow_receiver();
   for (std::size_t s = 0; s < sensors_.size(); ++s) {
     Record& record = records_[s];
-    if (std::min(record.steady, record.failures) < OffsetWatch::for_good || record.error.size() != 1 ||
-        sensors_[s].outputs.size() != 1)
-      continue;
+    if (!record.has_lasted() || record.error.size() != 1 || sensors_[s].outputs.size() != 1) continue;
     const int output = sensors_[s].outputs.front();
     const double error = record.error[0];
     if (memory_->offsets->move_bias(output, error, record.covariance(0, 0), filter))
       findings_[s] |= reason::moved;
-    else if (is_heading(filter, output) && memory_->offsets->can_be_off(output, record.mean, record.variance_of_mean()))
-      memory_->offsets->adopt_mean(output, record.mean, record.variance_of_mean());
+    else if (is_heading(filter, output) &&
+             memory_->offsets->can_be_off(output, record.mean[0], record.variance_of_mean(0)))
+      memory_->offsets->adopt_mean(output, record.mean[0], record.variance_of_mean(0));
     else
       continue;
     record = {};
@@ -626,7 +642,7 @@ bool SensorWatch::is_still_off(std::size_t sensor, const Innovation& innovation)
   if (value.size() == 1 && record.steady >= OffsetWatch::for_good && record.agrees < OffsetWatch::for_good) {
     const double noise = setup_.noise.output_variances[static_cast<std::size_t>(sensors_[sensor].outputs.front())];
     const double jump = std::abs(value[0] - record.error[0]);
-    if (jump * jump < close_gate * close_gate * noise || jump < 0.5 * std::abs(record.mean)) return true;
+    if (jump * jump < close_gate * close_gate * noise || jump < 0.5 * std::abs(record.mean[0])) return true;
   }
   const Innovation::OfSensor<1> rest = value - record.error;
   const double of_error = squared_size(rest, innovation.covariance);
@@ -686,8 +702,8 @@ void SensorWatch::note_offsets() noexcept {
     states_[s].rival = -1;
     for (const int j : sensors_[s].outputs) {
       const double offset = memory_->offsets->offset(j);
-      if (std::abs(offset) <= std::abs(states_[s].offset)) continue;
-      states_[s].offset = offset;
+      if (offset == 0.0) continue;
+      states_[s].offset = sensors_[s].outputs.size() == 1 ? offset : std::hypot(states_[s].offset, offset);
       states_[s].rival = sensor_of(memory_->offsets->rival(j), sensors_);
     }
     if (states_[s].offset != 0.0) findings_[s] |= reason::off;

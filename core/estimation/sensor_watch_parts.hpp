@@ -32,13 +32,26 @@ namespace rhec {
 inline constexpr int suspect_after = 3;
 // Samples of a dispute after which a position may have been wrong before, when another sensor seemed to be.
 inline constexpr int suspect_position = 4;
+// The logarithm of odds that convince: a hundred to one.
+inline constexpr double convincing = 4.6;
+// In typical magnitudes, how far off a state can be that is found anew.
+inline constexpr double displacement = 100.0;
+
+/// Where the vehicle is [m]; 0 where it has no such coordinate.
+inline Eigen::Vector2d position_of(const WalkingFilter& filter) noexcept {
+  const Roles& roles = filter.model().description().roles;
+  return {roles.position_x < 0 ? 0.0 : filter.mean()[roles.position_x],
+          roles.position_y < 0 ? 0.0 : filter.mean()[roles.position_y]};
+}
 
 /// A filter, and how long what it assumes has explained the measurements.
 struct SensorWatch::Hypothesis {
   WalkingFilter filter;
   bool is_active = false;
   int explained = 0, refuted = 0;
-  double evidence = 0.0;     ///< log likelihood of what is not disputed, more than by the filter without the sensor
+  /// Log likelihood of what is not disputed, more than by the filter without the sensor; where two are wrong, of what
+  /// is measured by others, more than if all of it were right.
+  double evidence = 0.0;
   bool is_informed = false;  ///< it has explained much before it was refuted
   // Of a sensor that has moved, while slip jumps as well: what was known after the last samples, how many had been
   // explained when slip was made anew, and how often in a row that was.
@@ -71,7 +84,7 @@ struct SensorWatch::Memory {
   }
   // A heading that is less certain is still being searched [rad].
   static constexpr double known_heading = 0.35;
-  // Disputes longer than this many times the proof mean that nothing explains the sensors.
+  // Disputes longer than this many times the proof, or as many steps, mean that nothing explains the sensors.
   static constexpr int hopeless = 3;
   // A hypothesis that has explained so many samples in a row has learnt how the vehicle moves.
   static constexpr int informed = 4;
@@ -87,7 +100,8 @@ struct SensorWatch::Memory {
       if (is_gap(recent->entry(ago - 1).time - recent->entry(ago).time, loss->usual_interval())) return true;
     return false;
   }
-  double now = unknown;  ///< of the last sample [s]
+  double now = unknown;            ///< of the last sample [s]
+  double unplaced_from = unknown;  ///< since then no sensor has said where the vehicle is [s]
   // Before the last advance, and that.
   Eigen::VectorXd before_mean;
   Eigen::MatrixXd before_covariance;
@@ -128,14 +142,17 @@ struct SensorWatch::Memory {
   }
   /// The same, of a heading that may be wrong, while it is not known who is.
   std::unique_ptr<HeadingSearch> second_thought;
-  std::vector<double> first_errors;  ///< n_y: by how much rejected outputs were off when the dispute began
-  int in_vain = 0;                   ///< samples in a row that it has not explained
-  Eigen::MatrixXd factor;            ///< of a covariance
-  Eigen::VectorXd away;              ///< of slip that has jumped from an estimate
-  Eigen::VectorXd before_update;     ///< the mean
-  Eigen::VectorXd before_slip;       ///< that of slip that may have jumped
-  Eigen::VectorXd near_slip;         ///< n_p, what such slip is nearly
-  bool is_slip_near = false;         ///< it began from that
+  std::unique_ptr<Hypothesis> double_fault;  ///< a position has moved, and those who are accused are wrong
+  std::vector<char> accused;                 ///< by sensor
+  std::vector<double> not_accused;           ///< n_y: what the others have measured
+  std::vector<double> first_errors;          ///< n_y: by how much rejected outputs were off when the dispute began
+  int in_vain = 0;                           ///< samples in a row that it has not explained
+  Eigen::MatrixXd factor;                    ///< of a covariance
+  Eigen::VectorXd away;                      ///< of slip that has jumped from an estimate
+  Eigen::VectorXd before_update;             ///< the mean
+  Eigen::VectorXd before_slip;               ///< that of slip that may have jumped
+  Eigen::VectorXd near_slip;                 ///< n_p, what such slip is nearly
+  bool is_slip_near = false;                 ///< it began from that
   /// By how much measurements ask for slip beyond its bounds: a cumulative sum of standard deviations (Page 1954).
   double beyond_bounds = 0.0;
   int impossible_samples = 0;  ///< in a row in which that sum was too large

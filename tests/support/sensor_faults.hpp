@@ -43,6 +43,21 @@ inline Robot with_two_receivers(const std::string& estimator, const std::string&
   return {host(), RobotOptions::table().parse(settings, "robot")};
 }
 
+/// A skid-steered robot with a compass, that of output 2.
+inline Robot with_compass(const std::string& estimator) {
+  return {host(), RobotOptions::table().parse(parse_yaml(R"(
+step: 0.2
+model: {name: skid_steer, wheel_radius: 0.2}
+noise: {outputs: {x_gps: 0.03, y_gps: 0.03, heading: 0.02}, inputs: {omega_left: 0.1, omega_right: 0.1}}
+estimator:
+  name: )" + estimator + R"(
+  horizon: 15
+  initial: {sigma: {x: 0.05, y: 0.05, psi: 0.03}}
+)",
+                                                         "robot"),
+                                              "robot")};
+}
+
 struct SensorFaults : ::testing::TestWithParam<const char*> {
   Robot vehicle = watched_robot(GetParam());
   static constexpr int seeds = 4;

@@ -19,20 +19,6 @@ using namespace rhec::testing;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-Robot with_compass(const std::string& estimator) {
-  return {host(), RobotOptions::table().parse(parse_yaml(R"(
-step: 0.2
-model: {name: skid_steer, wheel_radius: 0.2}
-noise: {outputs: {x_gps: 0.03, y_gps: 0.03, heading: 0.02}, inputs: {omega_left: 0.1, omega_right: 0.1}}
-estimator:
-  name: )" + estimator + R"(
-  horizon: 15
-  initial: {sigma: {x: 0.05, y: 0.05, psi: 0.03}}
-)",
-                                                         "robot"),
-                                              "robot")};
-}
-
 struct SensorAccusations : ::testing::TestWithParam<const char*> {
   /// How far rides are led away, in the mean [m], and how many by more than a limit.
   struct Led {

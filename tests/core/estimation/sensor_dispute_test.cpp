@@ -63,29 +63,6 @@ TEST_P(SensorDisputes, APositionThatHasMovedForGoodIsFollowed) {
   }
 }
 
-/// Of two receivers, the one that jumps is wrong, however long it stays away and however much better it was.
-TEST_P(SensorDisputes, APositionThatAnotherReceiverContradictsIsNotFollowed) {
-  for (const char* noise : {"0.3", "0.03"}) {
-    SCOPED_TRACE(noise);
-    const Robot two = with_two_receivers(GetParam(), noise);
-    for (const std::size_t receiver : {0U, 3U})
-      for (int seed = 1; seed <= seeds; ++seed) {
-        SCOPED_TRACE(receiver);
-        SCOPED_TRACE(seed);
-        const Fault fault{.spoil = [=](Delivery& d) { d.outputs[receiver] += 10.0; }, .length = 60};
-        const Episode episode = drive_with_fault(two, fault, static_cast<std::uint64_t>(seed), 0);
-        EXPECT_GE(episode.honest_share(), 0.95);
-        for (const Episode::Sample& sample : episode.during) {
-          EXPECT_LT(sample.error, receiver == 0 ? 1.0 : usual_error);
-          EXPECT_EQ(sample.health, HealthLevel::degraded) << "another receiver says where the vehicle is";
-          EXPECT_THAT(sample.words,
-                      HasSubstr(receiver == 0 ? "x_gps and y_gps rejected" : "x_rough and y_rough rejected"));
-        }
-        EXPECT_EQ(episode.counts.rebased, 0);
-      }
-  }
-}
-
 /// Neither slip nor unknown inputs explain what a steering encoder alone says; and however little is known of the angle
 /// without it, its error stays one.
 TEST_P(SensorDisputes, AnAngleThatIsOffForGoodIsNotBelieved) {

@@ -36,7 +36,7 @@ struct SensorHealth {
   std::uint32_t reasons = 0;  ///< at present; 0: none
   std::int64_t accepted = 0;  ///< measurements since the start
   std::int64_t rejected = 0;  ///< likewise
-  /// What is taken out of its values, in their unit; of several outputs the largest. 0: nothing.
+  /// What is taken out of its values, in their unit; of several outputs the length of all. 0: nothing.
   double offset = 0.0;
   /// The sensor from which it differs by that much, where it is not known which of the two is off; -1: none.
   int rival = -1;
