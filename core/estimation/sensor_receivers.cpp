@@ -50,8 +50,7 @@ bool SensorWatch::distrust_receiver() noexcept {
   int sensor = is_disputed_ ? disputed_position() : -1;
   if (sensor >= 0 && records_[static_cast<std::size_t>(sensor)].failures < setup_.proof) sensor = -1;
   if (const int output = offsets.suspected(); output >= 0 && sees_position(output))
-    for (std::size_t s = 0; s < sensors_.size(); ++s)
-      if (std::ranges::find(sensors_[s].outputs, output) != sensors_[s].outputs.end()) sensor = static_cast<int>(s);
+    sensor = sensor_of(output, sensors_);
   if (sensor < 0) return false;
   const std::vector<int>& outputs = sensors_[static_cast<std::size_t>(sensor)].outputs;
   if (std::ranges::any_of(outputs, [&](int j) { return offsets.is_sure(j); })) return false;

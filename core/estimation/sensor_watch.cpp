@@ -38,12 +38,6 @@ constexpr double offset_gate = 7.0;
 // standard deviation of how much it moves slip.
 constexpr double impossibly_beyond = 4.0, usually_beyond = 0.75, at_its_bound = 0.5;
 
-int sensor_of(int output, const std::vector<Sensor>& sensors) noexcept {
-  for (std::size_t s = 0; s < sensors.size(); ++s)
-    if (std::ranges::find(sensors[s].outputs, output) != sensors[s].outputs.end()) return static_cast<int>(s);
-  return -1;
-}
-
 /// Whether an output is the heading. What it is, positions say whatever slips; of a steering angle slip says otherwise.
 bool is_heading(const WalkingFilter& filter, int output) noexcept {
   const int heading = filter.model().description().roles.heading;
@@ -98,8 +92,10 @@ std::vector<OffsetWatch::Watched> watched_outputs(const WalkingFilter& filter, c
   const auto by_x = [&](int output) { return derivative(output, roles.position_x); };
   const auto by_y = [&](int output) { return derivative(output, roles.position_y); };
   const int count = static_cast<int>(about.size());
+  // How two receivers differ is told in the plane alone.
+  const bool has_place = roles.position_x >= 0 && roles.position_y >= 0;
   const auto is_same = [&](int j, int k) {
-    return about[j].device != about[k].device && by_x(j) == by_x(k) && by_y(j) == by_y(k);
+    return has_place && about[j].device != about[k].device && by_x(j) == by_x(k) && by_y(j) == by_y(k);
   };
   for (int j = 0; j < count; ++j) {
     if (by_x(j) == 0.0 && by_y(j) == 0.0) {

@@ -44,6 +44,13 @@ inline Eigen::Vector2d position_of(const WalkingFilter& filter) noexcept {
           roles.position_y < 0 ? 0.0 : filter.mean()[roles.position_y]};
 }
 
+/// The sensor that an output belongs to; -1: none.
+inline int sensor_of(int output, const std::vector<Sensor>& sensors) noexcept {
+  for (std::size_t s = 0; s < sensors.size(); ++s)
+    if (std::ranges::find(sensors[s].outputs, output) != sensors[s].outputs.end()) return static_cast<int>(s);
+  return -1;
+}
+
 /// A filter, and how long what it assumes has explained the measurements.
 struct SensorWatch::Hypothesis {
   WalkingFilter filter;
