@@ -44,7 +44,7 @@ class InformationLoss {
   }
 
   /// From the judge's moments before `duration` [s] with an input (n_u). `more_sigmas` (n_u, or null) as in
-  /// SensorWatch::advance: nobody has said what the input is.
+  /// SensorJudge::advance: nobody has said what the input is.
   void predict(const WalkingFilter& judge, const double* inputs, double duration, const double* more_sigmas) noexcept;
   /// That sample, before the judge uses what is left of it (n_y). `counts`: one of a quick sensor beside a slow one
   /// that says where the vehicle is does not.

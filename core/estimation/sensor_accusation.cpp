@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "innovation.hpp"
-#include "sensor_watch_parts.hpp"
+#include "sensor_judge_parts.hpp"
 
 // A compass or an encoder that was believed, and is wrong: the position tells.
 
@@ -27,7 +27,7 @@ constexpr double wrong_angle = 0.3;
 
 /// That a sensor is wrong since so many samples. `anew`: what it has said of its states before counts no longer, nor
 /// does what was made of that for slip.
-struct SensorWatch::Suspicion {
+struct SensorJudge::Suspicion {
   std::size_t sensor = 0;
   int ago = 0;
   bool anew = false;
@@ -36,7 +36,7 @@ struct SensorWatch::Suspicion {
 /// Goes on from what was known before a suspicion to what is expected now, without what is not missing in `retracted`,
 /// but with the positions that were rejected since. Whether these pass their gates then, and the sensor has jumped and
 /// fails a close gate (or is rejected anyway). `change`: what is remembered becomes that.
-bool SensorWatch::replay_without(const Suspicion& suspicion, WalkingFilter& filter, bool change) noexcept {
+bool SensorJudge::replay_without(const Suspicion& suspicion, WalkingFilter& filter, bool change) noexcept {
   Memory& memory = *memory_;
   const Sensor& sensor = sensors_[suspicion.sensor];
   const bool is_rejected = records_[suspicion.sensor].failures > 0;
@@ -85,7 +85,7 @@ bool SensorWatch::replay_without(const Suspicion& suspicion, WalkingFilter& filt
 
 /// The filter becomes what it would be if the suspicion had been known, and positions that were rejected are given
 /// back.
-SensorWatch::Finding SensorWatch::accuse(const Suspicion& suspicion, const Record& error,
+SensorJudge::Finding SensorJudge::accuse(const Suspicion& suspicion, const Record& error,
                                          const double* outputs) noexcept {
   Memory& memory = *memory_;
   held_count_ = memory.jump_count = 0;
@@ -124,7 +124,7 @@ SensorWatch::Finding SensorWatch::accuse(const Suspicion& suspicion, const Recor
 }
 
 /// Whether another sensor that sees the position has passed its gate, and has not been silent for long since.
-bool SensorWatch::is_placed_by_other(int position) const noexcept {
+bool SensorJudge::is_placed_by_other(int position) const noexcept {
   for (std::size_t s = 0; s < sensors_.size(); ++s)
     if (static_cast<int>(s) != position && sees_position(sensors_[s].outputs) && records_[s].failures == 0 &&
         is_heard(s))
@@ -134,7 +134,7 @@ bool SensorWatch::is_placed_by_other(int position) const noexcept {
 
 /// Whether a position fails since another sensor is wrong: without that one since some time all positions are
 /// explained, and it is not.
-bool SensorWatch::consider_other(const double* outputs, Finding& finding) noexcept {
+bool SensorJudge::consider_other(const double* outputs, Finding& finding) noexcept {
   Memory& memory = *memory_;
   const int position = disputed_position();
   if (position < 0) return false;
@@ -180,7 +180,7 @@ bool SensorWatch::consider_other(const double* outputs, Finding& finding) noexce
 
 /// The output whose offset is more probable than not, and explains a position that has failed more than once: both
 /// together say enough. -1: none.
-int SensorWatch::offset_in_dispute() noexcept {
+int SensorJudge::offset_in_dispute() noexcept {
   WalkingFilter& filter = own_->filter;
   const OffsetWatch& offsets = *memory_->offsets;
   const int output = offsets.probable();

@@ -3,7 +3,7 @@
 #include <numbers>
 
 #include "innovation.hpp"
-#include "sensor_watch_parts.hpp"
+#include "sensor_judge_parts.hpp"
 
 // Who is wrong, where a sensor and the estimate disagree.
 
@@ -39,7 +39,7 @@ void go_on_from(const WalkingFilter& from, WalkingFilter& filter) noexcept {
 }  // namespace
 
 /// What a position disputes has happened since the last one, of which samples of quicker sensors say little.
-void SensorWatch::start(Hypothesis& hypothesis) noexcept {
+void SensorJudge::start(Hypothesis& hypothesis) noexcept {
   hypothesis.is_active = true;
   hypothesis.explained = 0;
   const bool is_slip = &hypothesis == slip_.get();
@@ -68,7 +68,7 @@ void SensorWatch::start(Hypothesis& hypothesis) noexcept {
 
 /// Slip is made anew so many entries ago, near a value (n_p; null: what it was), and what has been measured since used
 /// with it. By how many of its standard deviations it would have to leave its bounds for that.
-double SensorWatch::replay_with_new_slip(int back, const double* near) noexcept {
+double SensorJudge::replay_with_new_slip(int back, const double* near) noexcept {
   WalkingFilter& filter = slip_->filter;
   memory_->recent->go_back(back, filter);
   if (near) std::copy_n(near, setup_.walk.size(), filter.mean().tail(std::ssize(setup_.walk)).data());
@@ -87,7 +87,7 @@ double SensorWatch::replay_with_new_slip(int back, const double* near) noexcept 
 /// The states that disputed sensors see are known anew: the position if it is among them, else all of them. One that
 /// has followed the sensor for some time, until it jumped again, knows more of heading and slip than the estimate,
 /// which has gone on without.
-void SensorWatch::start_moved(Hypothesis& hypothesis) noexcept {
+void SensorJudge::start_moved(Hypothesis& hypothesis) noexcept {
   WalkingFilter& filter = hypothesis.filter;
   const bool is_alone = &hypothesis == memory_->double_fault.get();
   hypothesis.begin();
@@ -109,7 +109,7 @@ void SensorWatch::start_moved(Hypothesis& hypothesis) noexcept {
 }
 
 /// Whether all measurements pass their gates.
-bool SensorWatch::fits(WalkingFilter& filter, const double* outputs) noexcept {
+bool SensorJudge::fits(WalkingFilter& filter, const double* outputs) noexcept {
   filter.expect();
   bool fits = true;
   for (std::size_t s = 0; s < sensors_.size(); ++s)
@@ -118,7 +118,7 @@ bool SensorWatch::fits(WalkingFilter& filter, const double* outputs) noexcept {
   return fits;
 }
 
-void SensorWatch::refute(Hypothesis& hypothesis) noexcept {
+void SensorJudge::refute(Hypothesis& hypothesis) noexcept {
   hypothesis.is_informed = hypothesis.explained >= Memory::informed;
   hypothesis.is_active = false;
   hypothesis.explained = 0;
@@ -127,7 +127,7 @@ void SensorWatch::refute(Hypothesis& hypothesis) noexcept {
 }
 
 /// Beside slip that has just been made anew goes one that is so on the next interval, too.
-void SensorWatch::begin_edge(bool is_new) noexcept {
+void SensorJudge::begin_edge(bool is_new) noexcept {
   edge_->is_active = is_new && slip_->is_active;
   if (!edge_->is_active) return;
   go_on_from(slip_->filter, edge_->filter);
@@ -137,7 +137,7 @@ void SensorWatch::begin_edge(bool is_new) noexcept {
 /// Whether slip that explains the first sample of a dispute, and not the second, has jumped within the interval before
 /// the first: on the interval behind it the vehicle then slips as much on all of its way, and what is measured is off
 /// farther, in the same direction. A receiver that has jumped stays where it is, or comes back.
-bool SensorWatch::goes_on() noexcept {
+bool SensorJudge::goes_on() noexcept {
   if (disputed_samples_ != fresh || slip_->explained != 1 || !edge_->is_active || !fits(edge_->filter, raw_.data()))
     return false;
   double along = 0.0, first = 0.0;
@@ -151,7 +151,7 @@ bool SensorWatch::goes_on() noexcept {
 }
 
 /// nu' S^-1 nu of the sensors that were rejected, together.
-double SensorWatch::disputed_nis(WalkingFilter& filter) noexcept {
+double SensorJudge::disputed_nis(WalkingFilter& filter) noexcept {
   filter.expect();
   double sum = 0.0;
   for (std::size_t s = 0; s < sensors_.size(); ++s)
@@ -161,7 +161,7 @@ double SensorWatch::disputed_nis(WalkingFilter& filter) noexcept {
 }
 
 /// Log likelihood of what is not missing of the present sample, but for a constant.
-double SensorWatch::likelihood(WalkingFilter& filter, const double* outputs) noexcept {
+double SensorJudge::likelihood(WalkingFilter& filter, const double* outputs) noexcept {
   filter.expect();
   double sum = 0.0;
   Innovation innovation;
@@ -173,7 +173,7 @@ double SensorWatch::likelihood(WalkingFilter& filter, const double* outputs) noe
 
 /// Where no slip within its bounds explains what follows slip that was found to have jumped, that has not: the sensor
 /// has left in steps, and was wrong from the first on. The filter then goes on as if it had said nothing.
-bool SensorWatch::retract_slip() noexcept {
+bool SensorJudge::retract_slip() noexcept {
   Memory& memory = *memory_;
   const bool is_slip = slip_->is_active && memory.slip_beyond < Memory::impossible_slip;
   if (disputed_samples_ != 1 || is_slip || memory.since_release > soon || !is_position_disputed()) return false;
@@ -199,13 +199,13 @@ bool SensorWatch::retract_slip() noexcept {
   return true;
 }
 
-SensorWatch::Retraction SensorWatch::retraction() const noexcept { return memory_->released; }
+SensorJudge::Retraction SensorJudge::retraction() const noexcept { return memory_->released; }
 
-std::span<const double> SensorWatch::jumps() const noexcept {
+std::span<const double> SensorJudge::jumps() const noexcept {
   return {memory_->jumps.data(), static_cast<std::size_t>(memory_->jump_count)};
 }
 
-void SensorWatch::confront(Hypothesis& hypothesis, const double* outputs, bool counts) noexcept {
+void SensorJudge::confront(Hypothesis& hypothesis, const double* outputs, bool counts) noexcept {
   const bool has_moved =
       &hypothesis == moved_.get() || &hypothesis == memory_->double_fault.get() || &hypothesis == back_.get();
   const bool may_change_slip = counts && has_moved && is_position_disputed();
@@ -220,45 +220,45 @@ void SensorWatch::confront(Hypothesis& hypothesis, const double* outputs, bool c
 }
 
 /// Whether a position has failed at its last sample.
-bool SensorWatch::is_place_disputed() const noexcept {
+bool SensorJudge::is_place_disputed() const noexcept {
   for (std::size_t s = 0; s < sensors_.size(); ++s)
     if (records_[s].failures > 0 && sees_position(sensors_[s].outputs)) return true;
   return false;
 }
 
 /// Whether a sensor that sees the position was rejected.
-bool SensorWatch::is_position_disputed() const noexcept {
+bool SensorJudge::is_position_disputed() const noexcept {
   for (std::size_t s = 0; s < sensors_.size(); ++s)
     if ((findings_[s] & reason::rejected) && sees_position(sensors_[s].outputs)) return true;
   return false;
 }
 
 /// Whether nothing explains a position that is disputed, and no other sensor has said for as long where the vehicle is.
-bool SensorWatch::is_place_lost() const noexcept {
+bool SensorJudge::is_place_lost() const noexcept {
   const int samples = std::min(disputed_samples_, unplaced_samples_), most = Memory::hopeless * setup_.proof;
   // Of a slow receiver so many samples are too long.
   const bool is_long = samples > setup_.proof && memory_->now - memory_->unplaced_from > most * setup_.step;
   return (samples > most || is_long) && is_position_disputed();
 }
 
-bool SensorWatch::sees_position(const std::vector<int>& outputs) const noexcept {
+bool SensorJudge::sees_position(const std::vector<int>& outputs) const noexcept {
   return std::ranges::any_of(outputs, [&](int j) { return sees_position(j); });
 }
 
-bool SensorWatch::sees_position(int output) const noexcept {
+bool SensorJudge::sees_position(int output) const noexcept {
   const Roles& roles = own_->filter.model().description().roles;
   return (roles.position_x >= 0 && own_->filter.depends_on(output, roles.position_x)) ||
          (roles.position_y >= 0 && own_->filter.depends_on(output, roles.position_y));
 }
 
 /// Whether a sensor that is not disputed has said where the vehicle is, and has not been silent for long since.
-bool SensorWatch::is_placed_otherwise() const noexcept {
+bool SensorJudge::is_placed_otherwise() const noexcept {
   return unplaced_samples_ < std::min(disputed_samples_, setup_.proof);
 }
 
 /// A disputed position can be followed only if nothing else says where the vehicle is, and any other sensor only if
 /// nothing else is measured, in this sample or lately.
-bool SensorWatch::may_follow() const noexcept {
+bool SensorJudge::may_follow() const noexcept {
   if (is_placed_otherwise()) return false;
   if (is_position_disputed()) return true;
   for (std::size_t s = 0; s < sensors_.size(); ++s) {
@@ -271,7 +271,7 @@ bool SensorWatch::may_follow() const noexcept {
 /// Slip that changes by less than what fails a gate at once turns the heading all the same, until a position is off by
 /// what new slip alone does not explain. What has been measured since is then used anew, from before that. False if
 /// this does not explain what is disputed either.
-bool SensorWatch::consider_slip_before() noexcept {
+bool SensorJudge::consider_slip_before() noexcept {
   if (disputed_samples_ != 1 || !is_position_disputed() || memory_->offsets->probable() >= 0) return false;
   // After a gap there is little to be used anew.
   if (std::ranges::any_of(records_, [](const Record& each) { return each.after_gap; })) return false;
@@ -284,7 +284,7 @@ bool SensorWatch::consider_slip_before() noexcept {
 }
 
 /// The log likelihood of slip that has jumped just now; NaN if it has not.
-double SensorWatch::consider_slip() noexcept {
+double SensorJudge::consider_slip() noexcept {
   const bool is_new = !slip_->is_active;
   double& beyond = memory_->slip_beyond;
   if (is_new) beyond = 0.0;
@@ -325,7 +325,7 @@ double SensorWatch::consider_slip() noexcept {
   return new_likelihood;
 }
 
-void SensorWatch::consider_moved(double likelihood_of_new_slip, const double* outputs) noexcept {
+void SensorJudge::consider_moved(double likelihood_of_new_slip, const double* outputs) noexcept {
   const bool is_new = !moved_->is_active;
   consider_double_fault();
   if (is_new) {
@@ -343,7 +343,7 @@ void SensorWatch::consider_moved(double likelihood_of_new_slip, const double* ou
 }
 
 /// The estimate goes along with what is disputed, or of that with the position alone.
-void SensorWatch::note_followed(bool alone) noexcept {
+void SensorJudge::note_followed(bool alone) noexcept {
   for (std::size_t s = 0; s < sensors_.size(); ++s) {
     if (alone && !sees_position(sensors_[s].outputs)) continue;
     if (findings_[s] & reason::rejected) findings_[s] |= reason::moved;
@@ -353,12 +353,12 @@ void SensorWatch::note_followed(bool alone) noexcept {
 }
 
 /// Whether a move has explained enough to be followed, and slip that has jumped meanwhile is known again.
-bool SensorWatch::has_proved(const Hypothesis& moved, bool after_gap) const noexcept {
+bool SensorJudge::has_proved(const Hypothesis& moved, bool after_gap) const noexcept {
   const bool is_slip_settled = moved.new_slips == 0 || moved.explained - moved.new_slip_since > setup_.slip_proof;
   return is_slip_settled && moved.explained >= (after_gap ? setup_.gap_proof : setup_.proof);
 }
 
-SensorWatch::Finding SensorWatch::settle(double time, const double* outputs) noexcept {
+SensorJudge::Finding SensorJudge::settle(double time, const double* outputs) noexcept {
   if (!is_disputed_) memory_->was_calm = std::min(calm_samples_, memory_->undisputed_samples) >= setup_.calm;
   is_disputed_ = true;
   if (++disputed_samples_ == 1) memory_->disputed_from = memory_->recent->keep_newest();
@@ -449,7 +449,7 @@ SensorWatch::Finding SensorWatch::settle(double time, const double* outputs) noe
   return {.retract = retracts};
 }
 
-bool SensorWatch::is_within_bounds(const Eigen::VectorXd& mean) const noexcept {
+bool SensorJudge::is_within_bounds(const Eigen::VectorXd& mean) const noexcept {
   const Eigen::Index nx = own_->filter.model().state_count();
   bool is_within = true;
   for (std::size_t j = 0; j < setup_.walk.size(); ++j) {
@@ -461,14 +461,14 @@ bool SensorWatch::is_within_bounds(const Eigen::VectorXd& mean) const noexcept {
 
 /// Whether what is disputed is rather slip that has jumped, which the next sample tells. Until then what is given out
 /// has the covariance of both answers, so that it agrees with what the sensors say: nothing is wrong with it.
-bool SensorWatch::is_probably_slip() const noexcept {
+bool SensorJudge::is_probably_slip() const noexcept {
   return is_disputed_ && disputed_samples_ <= fresh && slip_->is_active && slip_probability_ > probable &&
          memory_->was_calm && memory_->slip_beyond < Memory::impossible_slip && is_within_bounds(own_->filter.mean()) &&
          (input_findings_ | inputs_.reasons) == 0;
 }
 
 /// What was held back, and what was rejected last, is right after all.
-void SensorWatch::acquit(const double* outputs) noexcept {
+void SensorJudge::acquit(const double* outputs) noexcept {
   // Slip at a bound that measurements ask to be beyond it may well be there, as that of wheels that spin on the spot.
   const bool is_beyond = memory_->slip_beyond > unlikely_slip && !is_within_bounds(own_->filter.mean());
   const bool is_doubtful = !memory_->was_calm || is_beyond;
@@ -494,7 +494,7 @@ void SensorWatch::acquit(const double* outputs) noexcept {
   calm_samples_ = setup_.calm;
 }
 
-SensorWatch::Finding SensorWatch::accept(Hypothesis& hypothesis) noexcept {
+SensorJudge::Finding SensorJudge::accept(Hypothesis& hypothesis) noexcept {
   go_on_from(hypothesis.filter, own_->filter);
   if (&hypothesis != slip_.get()) memory_->offsets->forget_onsets();
   end_dispute();
@@ -503,7 +503,7 @@ SensorWatch::Finding SensorWatch::accept(Hypothesis& hypothesis) noexcept {
 
 /// Where a sensor that has moved does not explain what follows, the heading may be wrong, too, e.g. after a turn
 /// without a position. One that is found goes on as if the sensor had moved.
-void SensorWatch::think_again() noexcept {
+void SensorJudge::think_again() noexcept {
   if (!memory_->second_thought || moved_->refuted == 0 || moved_->explained >= Memory::informed) return;
   HeadingSearch& search = *memory_->second_thought;
   if (search.is_active()) {
@@ -528,7 +528,7 @@ void SensorWatch::think_again() noexcept {
 }
 
 /// Keeps what was rejected, in case it is right.
-void SensorWatch::hold_back(double time, const double* outputs) noexcept {
+void SensorJudge::hold_back(double time, const double* outputs) noexcept {
   if (held_count_ == static_cast<int>(held_.size())) return;
   Held& held = held_[held_count_++];
   held.time = time;
@@ -536,7 +536,7 @@ void SensorWatch::hold_back(double time, const double* outputs) noexcept {
   held.outputs.remove(outputs);
 }
 
-void SensorWatch::end_dispute() noexcept {
+void SensorJudge::end_dispute() noexcept {
   is_disputed_ = false;
   slip_probability_ = 0.0;
   disputed_samples_ = unplaced_samples_ = 0;
@@ -549,7 +549,7 @@ void SensorWatch::end_dispute() noexcept {
 }
 
 /// Whether the measured inputs explain the last interval again.
-void SensorWatch::test_inputs(const double* outputs) noexcept {
+void SensorJudge::test_inputs(const double* outputs) noexcept {
   WalkingFilter& trial = *memory_->trial;
   trial.mean() = memory_->before_mean;
   trial.covariance() = memory_->before_covariance;

@@ -1,14 +1,14 @@
 #include <algorithm>
 
 #include "innovation.hpp"
-#include "sensor_watch_parts.hpp"
+#include "sensor_judge_parts.hpp"
 
 // A position that has moved, while another sensor is wrong.
 
 namespace rhec {
 
 /// What others have measured than those who are accused.
-const double* SensorWatch::not_accused() noexcept {
+const double* SensorJudge::not_accused() noexcept {
   std::vector<double>& outputs = memory_->not_accused;
   std::copy(raw_.begin(), raw_.end(), outputs.begin());
   for (std::size_t s = 0; s < sensors_.size(); ++s)
@@ -20,7 +20,7 @@ const double* SensorWatch::not_accused() noexcept {
 /// Where a position and another sensor fail, a vehicle that was carried away explains both, and so do two sensors that
 /// are wrong at once: the position has moved, and the other one says nothing. What is measured of the way since tells,
 /// by the likelihood of each.
-void SensorWatch::consider_double_fault() noexcept {
+void SensorJudge::consider_double_fault() noexcept {
   Memory& memory = *memory_;
   Hypothesis& both = *memory.double_fault;
   const bool is_first = disputed_samples_ == 1 && is_position_disputed();
@@ -48,7 +48,7 @@ void SensorWatch::consider_double_fault() noexcept {
 
 /// Whether two that are wrong explain a position that passes its gate better than the estimate does, which goes on with
 /// one of them: it may be led to where the position is by chance.
-bool SensorWatch::passes_by_chance(std::size_t sensor) noexcept {
+bool SensorJudge::passes_by_chance(std::size_t sensor) noexcept {
   Hypothesis& both = *memory_->double_fault;
   if (!both.is_active || both.explained < Memory::informed || !(both.evidence > convincing) ||
       records_[sensor].failures == 0 || !sees_position(sensors_[sensor].outputs))
@@ -58,7 +58,7 @@ bool SensorWatch::passes_by_chance(std::size_t sensor) noexcept {
 }
 
 /// Whether it is rather that than that all of what is disputed is right.
-bool SensorWatch::is_double_fault() const noexcept {
+bool SensorJudge::is_double_fault() const noexcept {
   const Hypothesis& both = *memory_->double_fault;
   if (!both.is_active || !is_position_disputed()) return false;
   bool has_passed = false;  // one that is accused
@@ -69,7 +69,7 @@ bool SensorWatch::is_double_fault() const noexcept {
 }
 
 /// Who was accused is wrong, and has been since the position has moved, also if it has passed its gate.
-void SensorWatch::convict() noexcept {
+void SensorJudge::convict() noexcept {
   for (std::size_t s = 0; s < sensors_.size(); ++s) {
     if (!memory_->accused[s] || (findings_[s] & reason::rejected) ||
         !own_->filter.innovation(sensors_[s], weighed(raw_.data()), scratch_))

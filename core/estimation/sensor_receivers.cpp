@@ -2,7 +2,7 @@
 #include <cmath>
 
 #include "innovation.hpp"
-#include "sensor_watch_parts.hpp"
+#include "sensor_judge_parts.hpp"
 
 // Two receivers, of which one has moved for good.
 
@@ -18,7 +18,7 @@ constexpr double far_enough = 10.0;
 
 /// A receiver that has moved for good, and another one, which is not off, says by how much: it is used without that.
 /// What it is off by was known best when it jumped, when the estimate still went by it.
-bool SensorWatch::follow_receiver() noexcept {
+bool SensorJudge::follow_receiver() noexcept {
   const int sensor = disputed_position();
   const auto s = static_cast<std::size_t>(sensor);
   Record& record = records_[s];
@@ -44,7 +44,7 @@ bool SensorWatch::follow_receiver() noexcept {
 /// One that is used without what it is off by, and another one that has not moved contradicts it for long, in single
 /// innovations or in their sum: it has moved again, or was off by nothing constant. The vehicle is where the other one
 /// says. False if that is not so.
-bool SensorWatch::distrust_receiver() noexcept {
+bool SensorJudge::distrust_receiver() noexcept {
   OffsetWatch& offsets = *memory_->offsets;
   if (!offsets.has_sure()) return false;
   int sensor = is_disputed_ ? disputed_position() : -1;
@@ -61,12 +61,8 @@ bool SensorWatch::distrust_receiver() noexcept {
   offsets.forget_receivers();
   WalkingFilter& filter = own_->filter;
   const ModelDescription& about = filter.model().description();
-  for (const int i : {about.roles.position_x, about.roles.position_y}) {
-    filter.covariance().row(i).setZero();
-    filter.covariance().col(i).setZero();
-    const double sigma = displacement * about.states[static_cast<std::size_t>(i)].scale;
-    filter.covariance()(i, i) = sigma * sigma;
-  }
+  const auto far_away = [&](int state) { return displacement * about.states[static_cast<std::size_t>(state)].scale; };
+  filter.forget_place(far_away(about.roles.position_x), far_away(about.roles.position_y));
   filter.update(weighed(measured.data()));
   std::fill(records_.begin(), records_.end(), Record{});
   end_dispute();

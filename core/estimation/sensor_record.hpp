@@ -4,12 +4,12 @@
 
 #include "innovation.hpp"
 #include "offset_watch.hpp"
-#include "rhec/core/estimation/sensor_watch.hpp"
+#include "sensor_judge.hpp"
 
 namespace rhec {
 
 /// What a sensor has done in a row.
-struct SensorWatch::Record {
+struct SensorJudge::Record {
   int failures = 0, passes = 0;
   double since = 0.0;                               ///< time of the first of these failures [s]
   Eigen::Vector2d place = Eigen::Vector2d::Zero();  ///< where the vehicle was then [m]

@@ -1,7 +1,7 @@
 #include <cmath>
 
 #include "innovation.hpp"
-#include "sensor_watch_parts.hpp"
+#include "sensor_judge_parts.hpp"
 
 // A position that has moved, was followed, and comes back.
 
@@ -21,7 +21,7 @@ constexpr double considerable = 3.0;
 
 /// The first disputed sensor that sees the position; -1: none. Several that fail together have moved alike, as
 /// receivers do whose base station has.
-int SensorWatch::disputed_position() const noexcept {
+int SensorJudge::disputed_position() const noexcept {
   for (std::size_t s = 0; s < sensors_.size(); ++s)
     if ((findings_[s] & reason::rejected) && sees_position(sensors_[s].outputs)) return static_cast<int>(s);
   return -1;
@@ -29,7 +29,7 @@ int SensorWatch::disputed_position() const noexcept {
 
 /// Before what has moved is made anew: by how much it has, from where the estimate expects it or, if it has jumped
 /// again, from where it was.
-void SensorWatch::note_jump() noexcept {
+void SensorJudge::note_jump() noexcept {
   Memory& memory = *memory_;
   const bool goes_on = moved_->is_informed && memory.is_jump_known;
   memory.is_jump_known = false;
@@ -56,7 +56,7 @@ void SensorWatch::note_jump() noexcept {
 }
 
 /// The estimate follows a position that has moved: where it was before is remembered.
-void SensorWatch::leave_place(double time, bool after_gap) noexcept {
+void SensorJudge::leave_place(double time, bool after_gap) noexcept {
   memory_->was_return = false;
   if (!is_position_disputed()) return;
   const int sensor = disputed_position();
@@ -69,7 +69,7 @@ void SensorWatch::leave_place(double time, bool after_gap) noexcept {
 /// Whether it has come back to where it was before, which is a displacement that is known. Tried at every disputed
 /// sample, from where the estimate expects the position; or, if it had moved and jumps again, from there: it may then
 /// have come back to where it was when the dispute began, too.
-void SensorWatch::consider_return(double time) noexcept {
+void SensorJudge::consider_return(double time) noexcept {
   Memory& memory = *memory_;
   Hypothesis& back = *back_;
   if (back.is_active) {
@@ -121,7 +121,7 @@ void SensorWatch::consider_return(double time) noexcept {
 /// Slip may jump while a sensor has moved: whether slip that is made anew on the last interval explains what the
 /// hypothesis does not, within its bounds. Once it has explained some samples; and on the next interval once more, as
 /// of slip that has jumped within one.
-bool SensorWatch::changes_slip(Hypothesis& each) noexcept {
+bool SensorJudge::changes_slip(Hypothesis& each) noexcept {
   const int since = each.explained - each.new_slip_since;
   const int enough = &each == back_.get() && each.new_slips == 0 ? 1 : before_new_slip;
   const bool goes_on = each.new_slips == 1 && since == 1;
@@ -143,7 +143,7 @@ bool SensorWatch::changes_slip(Hypothesis& each) noexcept {
 }
 
 /// The estimate goes on with what has come back. It has moved only if the estimate had followed it.
-SensorWatch::Finding SensorWatch::come_back() noexcept {
+SensorJudge::Finding SensorJudge::come_back() noexcept {
   Memory& memory = *memory_;
   if (memory.place < memory.places.count()) {
     note_followed(false);
@@ -154,7 +154,7 @@ SensorWatch::Finding SensorWatch::come_back() noexcept {
   return accept(*back_);
 }
 
-bool SensorWatch::has_come_back() const noexcept {
+bool SensorJudge::has_come_back() const noexcept {
   const bool is_slip_settled = back_->new_slips == 0 || back_->explained - back_->new_slip_since >= setup_.slip_proof;
   return back_->is_active && is_slip_settled && back_->explained >= return_proof && !is_placed_otherwise();
 }

@@ -3,7 +3,7 @@
 
 #include "numbers.hpp"
 #include "rhec/core/base/angle.hpp"
-#include "sensor_watch_parts.hpp"
+#include "sensor_judge_parts.hpp"
 
 // What is said of an estimate, and of late measurements.
 
@@ -17,7 +17,7 @@ constexpr double a_while = 1.0;  // by which a position is late, so that a headi
 
 }  // namespace
 
-SensorWatch::Finding SensorWatch::judge_late(double time, double* outputs, const double* weights,
+SensorJudge::Finding SensorJudge::judge_late(double time, double* outputs, const double* weights,
                                              bool may_search) noexcept {
   if (!is_active_) return place_start(outputs, weights);
   bool has_position = false;
@@ -62,7 +62,7 @@ SensorWatch::Finding SensorWatch::judge_late(double time, double* outputs, const
   return {};
 }
 
-double SensorWatch::search_on(double time, bool is_hasty) noexcept {
+double SensorJudge::search_on(double time, bool is_hasty) noexcept {
   Memory& memory = *memory_;
   const int ago = memory.recent->behind(time);
   if (ago <= 0) return Memory::unknown;
@@ -73,18 +73,18 @@ double SensorWatch::search_on(double time, bool is_hasty) noexcept {
   return next.time;
 }
 
-void SensorWatch::remember_for(double time) noexcept { memory_->past->cover(time); }
+void SensorJudge::remember_for(double time) noexcept { memory_->past->cover(time); }
 
-void SensorWatch::begin_ahead() noexcept {
+void SensorJudge::begin_ahead() noexcept {
   copy_numbers(own_->filter.mean(), memory_->ahead->mean());
   copy_numbers(own_->filter.covariance(), memory_->ahead->covariance());
 }
 
-void SensorWatch::advance_ahead(double duration, const double* inputs) noexcept {
+void SensorJudge::advance_ahead(double duration, const double* inputs) noexcept {
   memory_->ahead->predict(is_blind_ ? believed_input_.data() : inputs, duration);
 }
 
-void SensorWatch::judge_ahead(double* outputs, const double* weights) noexcept {
+void SensorJudge::judge_ahead(double* outputs, const double* weights) noexcept {
   memory_->offsets->correct(outputs);
   if (!is_active_ || is_searching() || is_blind_) return;
   WalkingFilter& filter = *memory_->ahead;
@@ -98,7 +98,7 @@ void SensorWatch::judge_ahead(double* outputs, const double* weights) noexcept {
   filter.update_as_expected({outputs, weights});
 }
 
-void SensorWatch::follow(const Estimate& estimate) noexcept {
+void SensorJudge::follow(const Estimate& estimate) noexcept {
   const Model& model = own_->filter.model();
   const Eigen::Index nx = model.state_count(), np = model.parameter_count(), n = nx + np;
   if (estimate.state.size() != nx || estimate.parameters.size() != np || estimate.covariance.rows() != n) return;
@@ -116,11 +116,11 @@ void SensorWatch::follow(const Estimate& estimate) noexcept {
   copy_numbers(estimate.covariance, own_->filter.covariance());
 }
 
-double SensorWatch::covariance_factor() const noexcept { return memory_->covariance_factor; }
+double SensorJudge::covariance_factor() const noexcept { return memory_->covariance_factor; }
 
 /// What is learnt from correlated innovations is less than the estimate believes. Where it knows less than usual, as
 /// after a jump, that is what is missing; and of this it is right.
-void SensorWatch::Memory::note_whiteness(double volume, Eigen::Index size) noexcept {
+void SensorJudge::Memory::note_whiteness(double volume, Eigen::Index size) noexcept {
   double most = 1.0;
   for (const InnovationWhiteness& each : whiteness) most = std::max(most, each.factor());
   if (std::isfinite(volume)) {
@@ -133,9 +133,9 @@ void SensorWatch::Memory::note_whiteness(double volume, Eigen::Index size) noexc
   covariance_factor = 1.0 + (most - 1.0) * std::exp(-excess);
 }
 
-bool SensorWatch::is_in_doubt() const noexcept { return slip_probability_ > 0.0 || memory_->offsets->is_in_doubt(); }
+bool SensorJudge::is_in_doubt() const noexcept { return slip_probability_ > 0.0 || memory_->offsets->is_in_doubt(); }
 
-void SensorWatch::widen(Estimate& estimate) noexcept {
+void SensorJudge::widen(Estimate& estimate) noexcept {
   memory_->offsets->refine(estimate);
   const Model& model = own_->filter.model();
   const Eigen::Index nx = model.state_count(), n = nx + model.parameter_count();
@@ -162,7 +162,7 @@ void SensorWatch::widen(Estimate& estimate) noexcept {
 }
 
 /// What volume is usual is learnt where nothing is lacking.
-void SensorWatch::note_volume(const Estimate& estimate) noexcept {
+void SensorJudge::note_volume(const Estimate& estimate) noexcept {
   const double volume = log_volume(estimate.covariance, memory_->factor);
   memory_->note_whiteness(volume, estimate.covariance.rows());
   if (memory_->loss->is_active()) return;
@@ -172,7 +172,7 @@ void SensorWatch::note_volume(const Estimate& estimate) noexcept {
     usual_volume_ += (volume - usual_volume_) / volume_memory;
 }
 
-void SensorWatch::assess(const Estimate& estimate, std::span<const Presence> presence, Presence inputs,
+void SensorJudge::assess(const Estimate& estimate, std::span<const Presence> presence, Presence inputs,
                          std::uint32_t reasons, Health& health) noexcept {
   health.reasons = reasons;
   health.sensors.assign(states_.begin(), states_.end());
@@ -219,9 +219,9 @@ void SensorWatch::assess(const Estimate& estimate, std::span<const Presence> pre
   health.level = is_lost ? HealthLevel::lost : has_finding ? HealthLevel::degraded : HealthLevel::ok;
 }
 
-void SensorWatch::begin_predicting() noexcept { memory_->trial->inputs() = own_->filter.inputs(); }
+void SensorJudge::begin_predicting() noexcept { memory_->trial->inputs() = own_->filter.inputs(); }
 
-void SensorWatch::predict(double duration, const double* inputs, const double* input_sigmas,
+void SensorJudge::predict(double duration, const double* inputs, const double* input_sigmas,
                           Estimate& estimate) noexcept {
   WalkingFilter& filter = *memory_->trial;
   const Eigen::Index nx = filter.model().state_count(), np = filter.model().parameter_count();

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 #include <span>
+#include <utility>
 
 #include "innovation.hpp"
 #include "rhec/core/base/angle.hpp"
@@ -85,6 +86,15 @@ void WalkingFilter::limit_states() noexcept {
     if (!(sigma > most)) continue;
     covariance().row(j) *= most / sigma;
     covariance().col(j) *= most / sigma;
+  }
+}
+
+void WalkingFilter::forget_place(double sigma_x, double sigma_y) noexcept {
+  const Roles& roles = model().description().roles;
+  for (const auto& [state, sigma] : {std::pair{roles.position_x, sigma_x}, std::pair{roles.position_y, sigma_y}}) {
+    covariance().row(state).setZero();
+    covariance().col(state).setZero();
+    covariance()(state, state) = sigma * sigma;
   }
 }
 

@@ -41,12 +41,13 @@ class WalkingFilter {
   void update_as_expected(Measured outputs) noexcept;
   /// How the last update has used an output.
   KalmanFilter::Use use(int output) const noexcept { return filter_.use(output); }
-  /// Makes a parameter anew: its mean stays, with this standard deviation.
-  /// Nothing is known of the parameters but these standard deviations (n_p).
+  /// Makes the parameters anew: their means stay, with these standard deviations (n_p).
   void restart_parameters(const std::vector<double>& sigmas) noexcept {
     for (std::size_t j = 0; j < sigmas.size(); ++j)
       filter_.restart_parameter(static_cast<int>(j), sigmas[j] * sigmas[j]);
   }
+  /// Makes the position anew, of a vehicle that has both coordinates: it stays, with these standard deviations [m].
+  void forget_place(double sigma_x, double sigma_y) noexcept;
 
   /// Expected outputs and their derivatives, for `innovation`.
   void expect() noexcept;

@@ -36,6 +36,16 @@ Noise noise_of(const Model& model) {
   return noise;
 }
 
+KalmanFilter::Noise variances_of(const Model& model) {
+  const Noise noise = noise_of(model);
+  KalmanFilter::Noise variances;
+  for (const double sigma : noise.outputs) variances.output_variances.push_back(sigma * sigma);
+  for (const double sigma : noise.inputs) variances.input_variances.push_back(sigma * sigma);
+  variances.parameter_lower.assign(model.parameter_count(), -infinity);
+  variances.parameter_upper.assign(model.parameter_count(), infinity);
+  return variances;
+}
+
 Eigen::VectorXd initial_mean(const Model& model) {
   return Eigen::VectorXd::LinSpaced(model.state_count() + model.parameter_count(), 0.3, -0.7);
 }

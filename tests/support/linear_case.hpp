@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "rhec/core/estimation/kalman_filter.hpp"
 #include "rhec/core/estimation/receding_horizon_estimation.hpp"
 #include "rhec/core/estimation/smoother.hpp"
 #include "rhec/core/model/model.hpp"
@@ -92,6 +93,8 @@ struct Noise {
 };
 
 Noise noise_of(const Model& model);
+/// The same as variances, of parameters without bounds.
+KalmanFilter::Noise variances_of(const Model& model);
 
 Eigen::VectorXd initial_mean(const Model& model);
 /// With correlations, also between states and parameters.

@@ -19,18 +19,6 @@ namespace kalman_filter_test {
 
 using namespace testing;
 
-/// The noise variances of a linear case.
-KalmanFilter::Noise variances_of(const Model& model) {
-  const testing::Noise noise = noise_of(model);
-  const double infinity = std::numeric_limits<double>::infinity();
-  KalmanFilter::Noise variances;
-  for (const double sigma : noise.outputs) variances.output_variances.push_back(sigma * sigma);
-  for (const double sigma : noise.inputs) variances.input_variances.push_back(sigma * sigma);
-  variances.parameter_lower.assign(model.parameter_count(), -infinity);
-  variances.parameter_upper.assign(model.parameter_count(), infinity);
-  return variances;
-}
-
 KalmanFilter filter_for(const std::shared_ptr<const Model>& model) {
   KalmanFilter filter(model, variances_of(*model), 1);
   filter.mean = initial_mean(*model);

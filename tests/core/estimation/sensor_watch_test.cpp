@@ -1,7 +1,6 @@
 // An estimator whose sensors, stamps and inputs fail: what it makes of each fault, and whether it says so.
 #include "rhec/core/estimation/sensor_watch.hpp"
 
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <chrono>
@@ -10,7 +9,11 @@
 #include <limits>
 #include <random>
 #include <string>
+#include <vector>
 
+#include <Eigen/Core>
+
+#include "rhec/core/base/error.hpp"
 #include "support/sensor_faults.hpp"
 #include "support/test_clock.hpp"
 
@@ -19,57 +22,8 @@ namespace sensor_watch_test {
 
 using namespace rhec::testing;
 using namespace std::chrono_literals;
-using ::testing::HasSubstr;
 
 INSTANTIATE_TEST_SUITE_P(All, SensorFaults, ::testing::Values("ekf", "bank", "rhe"), name_of_estimator);
-
-TEST_P(SensorFaults, NoFaultNoFinding) {
-  expect_each({.spoil = {}, .length = 40}, [](const Episode& episode) {
-    EXPECT_EQ(episode.samples_to_ok(), 0);
-    EXPECT_EQ(episode.counts.rejected, 0);
-    EXPECT_EQ(episode.counts.rebased, 0);
-  });
-}
-
-/// Fixes that say how poor they are, e.g. below trees, are no fault, and are used for what they are; those that claim
-/// to be better than they are, are one.
-TEST_P(SensorFaults, MeasurementsAreJudgedByTheAccuracyThatTheyState) {
-  const auto off_by = [](double error, double stated) {
-    return [=](Delivery& d) {
-      for (int j : {0, 1}) {
-        d.outputs[j] += (d.since + j) % 2 == 0 ? error : -error;
-        d.sigmas[j] = stated;
-      }
-    };
-  };
-  expect_each({.spoil = off_by(2.0, 2.0), .length = 15}, [](const Episode& episode) {
-    EXPECT_EQ(episode.counts.rejected, 0);
-    EXPECT_LT(episode.largest_error_during(), 2.5);  // by the speed alone, on ground that changes
-    for (const Episode::Sample& sample : episode.during) EXPECT_TRUE(sample.inside) << sample.error;
-    EXPECT_LE(episode.samples_to_recover(usual_error), 5);
-  });
-  expect_each({.spoil = off_by(2.0, 0.1), .length = 15}, [](const Episode& episode) {
-    EXPECT_GT(episode.counts.rejected, 10);
-    EXPECT_THAT(episode.during[0].words, HasSubstr("x_gps and y_gps rejected"));
-  });
-}
-
-TEST_P(SensorFaults, AValueThatIsStuckIsFound) {
-  double held = 0.0;
-  expect_each({.spoil =
-                   [&](Delivery& d) {
-                     if (d.since == 0) held = d.outputs[2];
-                     d.outputs[2] = held;
-                   },
-               .length = 30},
-              [](const Episode& episode) {
-                EXPECT_LE(episode.samples_to_recover(usual_error), 5);
-                bool is_found = false;
-                for (const Episode::Sample& sample : episode.during)
-                  is_found = is_found || sample.words.find("delta") != std::string::npos;
-                EXPECT_TRUE(is_found);
-              });
-}
 
 TEST_P(SensorFaults, AClockThatIsSetIsFollowed) {
   for (const double jump : {-1000.0, 1000.0, -1.5e9}) {
@@ -89,14 +43,6 @@ TEST_P(SensorFaults, AWrongStampIsRefused) {
       EXPECT_EQ(episode.samples_to_recover(usual_error), 0);
       EXPECT_EQ(episode.counts.clocks_set, 0);
     });
-  }
-}
-
-TEST_P(SensorFaults, AnImpossibleInputIsNotUsed) {
-  for (const double value : {1e6, -9e14, nan, std::numeric_limits<double>::infinity()}) {
-    SCOPED_TRACE(value);
-    expect_each({.spoil = [=](Delivery& d) { d.inputs[0] = value; }},
-                [](const Episode& episode) { EXPECT_LE(episode.samples_to_recover(usual_error), 1); });
   }
 }
 
@@ -127,6 +73,56 @@ TEST_P(SensorFaults, AnEstimatorThatIsAlwaysLateComesBackFromASilence) {
       EXPECT_LE(episode.samples_to_ok(), 20);
     }
   }
+}
+
+/// The setup of a trolley, which has two states and no parameters.
+SensorWatch::Setup trolley_setup(const Model& model) {
+  return {.noise = variances_of(model), .walk = {}, .parameter_sigmas = {}};
+}
+
+TEST(SensorWatch, RefusesSizesThatAreNotThoseOfItsModel) {
+  const auto model = linear_model<Trolley>();
+  const auto refusal = [&](const auto& spoil) -> std::string {
+    SensorWatch::Setup setup = trolley_setup(*model);
+    spoil(setup);
+    try {
+      SensorWatch(model, setup);
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_EQ(refusal([](SensorWatch::Setup&) {}), "");
+  EXPECT_EQ(refusal([](SensorWatch::Setup& setup) { setup.walk = {0.1}; }),
+            "sensor watch: 1 walks and 0 standard deviations of parameters; expected 0 of each");
+  EXPECT_EQ(refusal([](SensorWatch::Setup& setup) {
+              setup.initial_mean = Eigen::VectorXd::Zero(3);
+              setup.initial_covariance = Eigen::MatrixXd::Identity(3, 2);
+            }),
+            "sensor watch: an initial mean of 3 values, and a covariance of 3 x 2; expected 2");
+}
+
+TEST(SensorWatch, JudgesFromTheFirstEstimateOn) {
+  const auto model = linear_model<Trolley>();
+  SensorWatch watch(model, trolley_setup(*model));
+  const auto judge = [&](double time) {
+    std::vector<double> outputs(static_cast<std::size_t>(model->output_count()), 1e3);
+    watch.begin_innovations();
+    watch.judge(time, outputs.data());
+    return outputs;
+  };
+  EXPECT_FALSE(watch.is_active());
+  for (const double value : judge(0.0)) EXPECT_EQ(value, 1e3);
+  EXPECT_TRUE(watch.innovations().empty());
+  watch.restart(initial_mean(*model), initial_covariance(*model));
+  EXPECT_TRUE(watch.is_active());
+  EXPECT_EQ(watch.mean(), initial_mean(*model));
+  EXPECT_EQ(watch.covariance(), initial_covariance(*model));
+  for (const double value : judge(0.2)) EXPECT_TRUE(std::isnan(value)) << value;
+  ASSERT_EQ(watch.innovations().size(), watch.sensors().size());
+  for (const Innovation& each : watch.innovations()) EXPECT_FALSE(each.accepted);
+  watch.reset();
+  EXPECT_FALSE(watch.is_active());
 }
 
 }  // namespace sensor_watch_test

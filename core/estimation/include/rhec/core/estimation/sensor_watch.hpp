@@ -5,7 +5,6 @@
 #include <span>
 #include <vector>
 
-#include "rhec/core/base/infinity.hpp"
 #include "rhec/core/estimation/estimate.hpp"
 #include "rhec/core/estimation/health.hpp"
 #include "rhec/core/estimation/sensor_watch_setup.hpp"
@@ -13,8 +12,7 @@
 namespace rhec {
 
 class FilterMemo;
-class HeadingSearch;
-class WalkingFilter;
+class SensorJudge;
 
 /// Judges measurements before an estimator uses them (docs/health.md).
 ///
@@ -41,8 +39,8 @@ class RHEC_EXPORT SensorWatch {
   SensorWatch(std::shared_ptr<const Model> model, const Setup& setup);
   ~SensorWatch();
 
-  const std::vector<Sensor>& sensors() const noexcept { return sensors_; }
-  const Setup& setup() const noexcept { return setup_; }
+  const std::vector<Sensor>& sensors() const noexcept;
+  const Setup& setup() const noexcept;
   std::shared_ptr<const FilterMemo> make_memo();  ///< see EstimationMethod::listen
   void reset() noexcept;
   /// Marks measured inputs that cannot be as missing (NaN).
@@ -78,8 +76,8 @@ class RHEC_EXPORT SensorWatch {
     MeasuredOutputs outputs;
   };
   /// Measurements that were rejected and turned out right, before the last one; after `judge` has said so.
-  const std::vector<Held>& held() const noexcept { return held_; }
-  int held_count() const noexcept { return held_count_; }
+  const std::vector<Held>& held() const noexcept;
+  int held_count() const noexcept;
   /// Times of samples behind which slip has jumped; after `judge` has said so.
   std::span<const double> jumps() const noexcept;
   struct Retraction {
@@ -91,9 +89,9 @@ class RHEC_EXPORT SensorWatch {
   const Eigen::MatrixXd& covariance() const noexcept;
 
   /// By sensor.
-  std::span<const SensorHealth> sensor_states() const noexcept { return states_; }
+  std::span<const SensorHealth> sensor_states() const noexcept;
   /// False while there is nothing to judge by: before the first estimate, and while a heading is searched.
-  bool is_active() const noexcept { return is_active_; }
+  bool is_active() const noexcept;
   /// Goes on from moments of [x; p] that somebody else has given.
   void restart(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance) noexcept;
   /// Goes on from an estimate.
@@ -112,11 +110,9 @@ class RHEC_EXPORT SensorWatch {
   /// its mean is from the estimate's (Bar-Shalom, Li and Kirubarajan 2001). The mean stays: no measurement moves it.
   void widen(Estimate& estimate) noexcept;
 
-  void begin_innovations() noexcept { innovation_count_ = 0; }
+  void begin_innovations() noexcept;
   /// Those judged since then, the first ones if there are very many.
-  std::span<const Innovation> innovations() const noexcept {
-    return {innovations_.data(), static_cast<std::size_t>(innovation_count_)};
-  }
+  std::span<const Innovation> innovations() const noexcept;
   enum class Presence : std::uint8_t {
     present,
     overdue,  ///< a measurement was to be expected
@@ -127,74 +123,7 @@ class RHEC_EXPORT SensorWatch {
               Health& health) noexcept;
 
  private:
-  struct Hypothesis;
-  struct Memory;
-  struct Suspicion;
-  struct Record;
-  bool admits(std::size_t sensor, const Innovation&innovation) noexcept, passes_by_chance(std::size_t sensor) noexcept;
-  bool follow_biases(WalkingFilter&filter) noexcept, follow_receiver() noexcept, distrust_receiver() noexcept;
-  bool is_still_off(std::size_t sensor, const Innovation& innovation) const noexcept;
-  Measured weighed(const double* outputs) const noexcept;
-  const double* not_accused() noexcept;
-  void find_stuck(double*outputs) noexcept, note_sample(double time, const double*outputs) noexcept;
-  void note_motion(double duration, const double*inputs) noexcept, forget_reasons() noexcept;
-  bool is_searching() const noexcept, is_expected(std::size_t s) const noexcept, is_heard(std::size_t s) const noexcept;
-  void start_search(const double*) noexcept, begin_anew(const double*outputs) noexcept, think_again() noexcept;
-  void search_from(WalkingFilter& filter, HeadingSearch& search, const double* outputs,
-                   double sigma = infinity) noexcept;
-  Finding search_heading(const double*outputs) noexcept, place_start(const double*, const double*weights) noexcept;
-  bool is_heading_open(const WalkingFilter& filter, Measured outputs) noexcept;
-  Finding open_heading(double time, const double*outputs) noexcept, judge_each(double time, double*outputs) noexcept;
-  void start(Hypothesis&hypothesis) noexcept, start_moved(Hypothesis&hypothesis) noexcept;
-  bool fits(WalkingFilter& filter, const double* outputs) noexcept;
-  void refute(Hypothesis&hypothesis) noexcept, consider_double_fault() noexcept;
-  double disputed_nis(WalkingFilter&filter) noexcept, likelihood(WalkingFilter&filter, const double*outputs) noexcept;
-  void confront(Hypothesis& hypothesis, const double* outputs, bool counts) noexcept;
-  Finding settle(double time, const double* outputs) noexcept;
-  Finding accept(Hypothesis&hypothesis) noexcept, come_back() noexcept;
-  double consider_slip() noexcept, replay_with_new_slip(int back, const double*near) noexcept;
-  bool retract_slip() noexcept, replay_without(const Suspicion&suspicion, WalkingFilter&filter, bool change) noexcept;
-  Finding accuse(const Suspicion& suspicion, const Record& error, const double* outputs) noexcept;
-  bool consider_other(const double*outputs, Finding&finding) noexcept, is_placed_by_other(int position) const noexcept;
-  void consider_moved(double likelihood_of_new_slip, const double* outputs) noexcept;
-  bool is_double_fault() const noexcept, has_proved(const Hypothesis&moved, bool after_gap) const noexcept;
-  void consider_return(double time) noexcept, leave_place(double time, bool after_gap) noexcept;
-  void note_jump() noexcept, note_followed(bool alone) noexcept, begin_edge(bool is_new) noexcept, convict() noexcept;
-  bool has_come_back() const noexcept, changes_slip(Hypothesis&each) noexcept, end_offset() noexcept;
-  bool goes_on() noexcept, may_follow() const noexcept, consider_slip_before() noexcept;
-  int disputed_position() const noexcept, offset_in_dispute() noexcept;
-  void hold_back(double time, const double*outputs) noexcept, acquit(const double*) noexcept, end_dispute() noexcept;
-  bool sees_position(int output) const noexcept, sees_position(const std::vector<int>&outputs) const noexcept;
-  bool is_position_disputed() const noexcept, is_place_disputed() const noexcept;
-  bool is_place_lost() const noexcept, is_placed_otherwise() const noexcept;
-  bool is_within_bounds(const Eigen::VectorXd&mean) const noexcept, is_probably_slip() const noexcept;
-  void note_offsets() noexcept, note_corrected(bool has_jumped) noexcept, test_inputs(const double*outputs) noexcept;
-  void remember(double time, const double*outputs) noexcept, note_volume(const Estimate&estimate) noexcept;
-  double limit(std::size_t sensor, Eigen::Index degrees) const noexcept;
-
-  Setup setup_;
-  std::vector<Sensor> sensors_;
-  std::vector<double> limits_, close_limits_;  ///< of nu' S^-1 nu, by the number of values
-  std::vector<Record> records_;                ///< by sensor
-  std::vector<double> excesses_;               ///< by sensor, mean nu' S^-1 nu by degree of freedom, of late
-  std::vector<double> heard_;                  ///< by sensor, when it was measured last [s]; NaN: never
-  bool is_unobserved_ = false;                 ///< the motion since the last sample is not known
-  double usual_volume_ = 0.0;  ///< mean log sqrt(det P) of late, where nothing was lacking; NaN: none yet
-  std::unique_ptr<Hypothesis> own_, slip_, edge_, moved_, back_, blind_;  ///< edge_: slip that goes on jumping
-  std::unique_ptr<Memory> memory_;
-  bool is_active_ = false, is_disputed_ = false, is_blind_ = false;
-  double slip_probability_ = 0.0;  ///< that slip has jumped, while that is open
-  int disputed_samples_ = 0, unplaced_samples_ = 0, trusted_samples_ = 0, calm_samples_ = 0;
-  std::vector<SensorHealth> states_;  ///< by sensor
-  SensorHealth inputs_;
-  std::uint32_t input_findings_ = 0;
-  std::vector<std::uint32_t> findings_;                             ///< by sensor, of the last sample
-  std::vector<int> quiet_;                                          ///< by sensor, samples since the last finding
-  std::vector<double> raw_, raw_weights_, input_, believed_input_;  ///< weights: none where all are 1
-  std::vector<Held> held_;
-  std::vector<Innovation> innovations_;
-  int held_count_ = 0, innovation_count_ = 0;
-  Innovation scratch_;
+  std::unique_ptr<SensorJudge> judge_;
 };
 
 }  // namespace rhec

@@ -15,7 +15,7 @@
 #include "support/sensor_faults.hpp"
 
 namespace rhec {
-namespace sensor_watch_compass_test {
+namespace sensor_gate_compass_test {
 
 using namespace rhec::testing;
 
@@ -129,5 +129,5 @@ TEST_P(Compass, ThatIsOffForGoodIsUsedWithoutItsOffset) {
   EXPECT_GE(right, drives - 1);
 }
 
-}  // namespace sensor_watch_compass_test
+}  // namespace sensor_gate_compass_test
 }  // namespace rhec

@@ -19,12 +19,12 @@
 #include "past_moments.hpp"
 #include "past_places.hpp"
 #include "recent_samples.hpp"
-#include "rhec/core/estimation/sensor_watch.hpp"
+#include "sensor_judge.hpp"
 #include "sensor_record.hpp"
 #include "stuck_values.hpp"
 #include "walking_filter.hpp"
 
-// What the sources of SensorWatch share.
+// What the sources of SensorJudge share.
 
 namespace rhec {
 
@@ -32,6 +32,8 @@ namespace rhec {
 inline constexpr int suspect_after = 3;
 // Samples of a dispute after which a position may have been wrong before, when another sensor seemed to be.
 inline constexpr int suspect_position = 4;
+// Standard deviations of a closer gate, if gates are not closer themselves.
+inline constexpr double close_gate = 3.0;
 // The logarithm of odds that convince: a hundred to one.
 inline constexpr double convincing = 4.6;
 // In typical magnitudes, how far off a state can be that is found anew.
@@ -52,7 +54,7 @@ inline int sensor_of(int output, const std::vector<Sensor>& sensors) noexcept {
 }
 
 /// A filter, and how long what it assumes has explained the measurements.
-struct SensorWatch::Hypothesis {
+struct SensorJudge::Hypothesis {
   WalkingFilter filter;
   bool is_active = false;
   int explained = 0, refuted = 0;
@@ -79,7 +81,7 @@ struct SensorWatch::Hypothesis {
 };
 
 /// What was known after the last samples, and the motion since then.
-struct SensorWatch::Memory {
+struct SensorJudge::Memory {
   static constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
   static constexpr std::size_t past_moments = 128;
   // Samples without a position that are remembered between two of them, at most.

@@ -11,7 +11,7 @@
 #include "support/sensor_faults.hpp"
 
 namespace rhec {
-namespace sensor_watch_biases_test {
+namespace sensor_gate_biases_test {
 
 using namespace rhec::testing;
 
@@ -111,5 +111,5 @@ TEST_P(Biases, AreTheSameAfterAFaultOfOthers) {
   EXPECT_GE(seen.ok, 0.99);
 }
 
-}  // namespace sensor_watch_biases_test
+}  // namespace sensor_gate_biases_test
 }  // namespace rhec
