@@ -23,7 +23,7 @@ constexpr int most_steps_of_slip = 2;
 /// Within an interval, what is unknown are the state at its start, the input's noise and that of the processes: a
 /// measurement at a later time tells of all of them. The vector [x; z; u; q] takes such measurements in one after the
 /// other, and only then moves to the interval's end.
-void PriorBank::predict(const MeasuredInterval& measured, Measured end_outputs) noexcept {
+void PriorBank::Filters::predict(const MeasuredInterval& measured, Measured end_outputs) noexcept {
   is_curved_ = false;
   std::ranges::fill(added_, 0.0);
   const bool has_motion = measures_motion(setup_.motion_outputs, measured, static_cast<std::size_t>(ny_), end_outputs);
@@ -54,13 +54,13 @@ void PriorBank::predict(const MeasuredInterval& measured, Measured end_outputs) 
   keep_near_bounds();
 }
 
-int PriorBank::wide_count() const noexcept {
+int PriorBank::Filters::wide_count() const noexcept {
   return plain_count() + (ahead_ && !ahead_->mixture.curved().empty() ? Curvature::factors : 0);
 }
 
 /// Linearises the interval where its measurements put every member. All start where they put a filter on the mixture,
 /// and have that filter's second-order terms.
-MeasuredInterval PriorBank::look_ahead(const MeasuredInterval& measured, Measured end_outputs) noexcept {
+MeasuredInterval PriorBank::Filters::look_ahead(const MeasuredInterval& measured, Measured end_outputs) noexcept {
   const std::ptrdiff_t M = lanes_;
   for (int j = 0; j < ny_; ++j) ahead_->mixture.set_output_variance(j, counted_[j]);
   for (int j = 0; j < np_; ++j) {
@@ -113,7 +113,7 @@ MeasuredInterval PriorBank::look_ahead(const MeasuredInterval& measured, Measure
 
 /// Outputs as expected at the means, linearised where they put the members. Those of motion that are curved have means
 /// and variances of their second-order terms, as of a KalmanFilter, by the mixture's covariance.
-void PriorBank::linearise_given(const double* y) noexcept {
+void PriorBank::Filters::linearise_given(const double* y) noexcept {
   const std::ptrdiff_t M = lanes_;
   std::copy(mean_.begin(), mean_.end(), wide_mean_.begin());
   std::copy(mean_.begin(), mean_.end(), ahead_->trial_mean.begin());
@@ -158,7 +158,7 @@ void PriorBank::linearise_given(const double* y) noexcept {
 }
 
 /// Adds inputs and noise of the processes, which are not correlated with anything yet.
-void PriorBank::widen() noexcept {
+void PriorBank::Filters::widen() noexcept {
   const std::ptrdiff_t a = wide_count(), M = lanes_;
   std::copy(mean_.begin(), mean_.end(), wide_mean_.begin());
   std::fill(wide_mean_.begin() + n_ * M, wide_mean_.end(), 0.0);
@@ -181,7 +181,7 @@ void PriorBank::widen() noexcept {
 }
 
 /// Part of a factor of the second-order terms in a state, between the first measurement (0) and the end (1).
-double PriorBank::curvature_factor(int state, int factor, double from_first) const noexcept {
+double PriorBank::Filters::curvature_factor(int state, int factor, double from_first) const noexcept {
   const Curvature& terms = ahead_->mixture.curvature();
   const double start = terms.factor(state, factor),
                end = terms.factor(state + static_cast<int>(ahead_->mixture.curved().size()), factor);
@@ -189,7 +189,7 @@ double PriorBank::curvature_factor(int state, int factor, double from_first) con
 }
 
 /// Adds the means of the second-order terms to where the members were integrated.
-void PriorBank::add_curvature(double from_first) noexcept {
+void PriorBank::Filters::add_curvature(double from_first) noexcept {
   if (!is_curved_) return;
   const Curvature& terms = ahead_->mixture.curvature();
   const std::vector<int>& curved = ahead_->mixture.curved();
@@ -204,7 +204,8 @@ void PriorBank::add_curvature(double from_first) noexcept {
 }
 
 /// Gradient of an output by the wide vector, where it was integrated and observed last.
-void PriorBank::write_wide_gradient(int output, double share, double from_first, double* gradient) const noexcept {
+void PriorBank::Filters::write_wide_gradient(int output, double share, double from_first,
+                                             double* gradient) const noexcept {
   const int columns = nx_ + nu_ + 2 * np_, noises = n_ + nu_;
   std::fill_n(gradient, static_cast<std::ptrdiff_t>(wide_count()) * lanes_, 0.0);
   for (int m = 0; m < lanes_; ++m) {
@@ -244,7 +245,7 @@ void PriorBank::write_wide_gradient(int output, double share, double from_first,
 
 /// Expected outputs and their gradients, of those that y has (n_y, NaN where missing), where the members were
 /// integrated last: those of measurement number `which` of the interval.
-void PriorBank::linearise_outputs(int which, const double* y, double share, double from_first) noexcept {
+void PriorBank::Filters::linearise_outputs(int which, const double* y, double share, double from_first) noexcept {
   const std::ptrdiff_t M = lanes_, first = static_cast<std::ptrdiff_t>(which) * ny_;
   observe_members(next_rows_.data());
   std::copy(predicted_.begin(), predicted_.end(), wide_predicted_.begin() + first * M);
@@ -254,7 +255,7 @@ void PriorBank::linearise_outputs(int which, const double* y, double share, doub
 }
 
 /// All measurements between the nodes, outputs y at the end (null: none), and the end itself, about `point_`.
-void PriorBank::linearise_about_point(const MeasuredInterval& interval, Measured end_outputs) noexcept {
+void PriorBank::Filters::linearise_about_point(const MeasuredInterval& interval, Measured end_outputs) noexcept {
   for (int k = 0; k < interval.between; ++k) {
     const double seconds = interval.times[k], first = interval.times[0],
                  from_first = (seconds - first) / (interval.duration - first);
@@ -270,7 +271,7 @@ void PriorBank::linearise_about_point(const MeasuredInterval& interval, Measured
 }
 
 /// The outputs of measurement number `which` as expected at a mean of the wide vector, linearised about `point_`.
-void PriorBank::expect_outputs(int which, const double* y, const double* mean) noexcept {
+void PriorBank::Filters::expect_outputs(int which, const double* y, const double* mean) noexcept {
   const std::ptrdiff_t a = wide_count(), M = lanes_;
   for (std::ptrdiff_t j = 0; j < ny_; ++j) {
     if (std::isnan(y[j])) continue;
@@ -285,7 +286,7 @@ void PriorBank::expect_outputs(int which, const double* y, const double* mean) n
 
 /// The next points of the members: the means given the measurements between the nodes and the outputs of motion at the
 /// end, linearised about the points. False if no point moves by much.
-bool PriorBank::move_point(const MeasuredInterval& interval, Measured end_outputs) noexcept {
+bool PriorBank::Filters::move_point(const MeasuredInterval& interval, Measured end_outputs) noexcept {
   constexpr double little = least_look_ahead_step * least_look_ahead_step;
   const int a = wide_count();
   const std::ptrdiff_t M = lanes_, entries = a * M;
@@ -321,14 +322,14 @@ bool PriorBank::move_point(const MeasuredInterval& interval, Measured end_output
 }
 
 /// How many measurements those of number `which` stand for.
-const double* PriorBank::reading_weights(int which) const noexcept {
+const double* PriorBank::Filters::reading_weights(int which) const noexcept {
   return ahead_->mixture.summary().weights() + static_cast<std::ptrdiff_t>(which) * ny_;
 }
 
 /// Noise variances of the outputs of measurement number `which`, linearised before. How far slip is from its ramp
 /// within the interval is common to readings that are close; as noise of each of them it would count for too little:
 /// the mean of a Brownian bridge has the variance Q / 12, that of four values the quarter of Q / 6. So it counts twice.
-void PriorBank::weigh_readings(int which) noexcept {
+void PriorBank::Filters::weigh_readings(int which) noexcept {
   const double* const weights = reading_weights(which);
   for (std::ptrdiff_t j = 0; j < ny_; ++j)
     std::fill_n(output_variances_.data() + j * lanes_, lanes_, counted_[j] / weights[j]);
@@ -351,8 +352,9 @@ void PriorBank::weigh_readings(int which) noexcept {
 /// No law of slip knows an edge of the ground within an interval: beside a gyro it is an innovation of tens of standard
 /// deviations, and linearised it would be laid on whatever is uncertain, heading and inputs too. So an innovation
 /// counts as no more than three, with noise as large as that takes.
-void PriorBank::LookAhead::bound_surprises(const BankView& view, const Views& views, const double* y,
-                                           const std::vector<int>& motion_outputs, double* variances) noexcept {
+void PriorBank::Filters::LookAhead::bound_surprises(const BankView& view, const Views& views, const double* y,
+                                                    const std::vector<int>& motion_outputs,
+                                                    double* variances) noexcept {
   constexpr double most = 9.0;
   const std::ptrdiff_t M = view.members;
   bank_kernels().surprise(view, views.outputs.data(), views.taken, surprises.data());
@@ -377,7 +379,7 @@ void PriorBank::LookAhead::bound_surprises(const BankView& view, const Views& vi
 ///
 /// Readings of an output of motion within one interval lie on a few metres of ground, where every field is smooth, and
 /// tell of that together: of a law they say the same again and again. So the last of them weighs the members.
-void PriorBank::take_between(const MeasuredInterval& interval, int which, bool about_point) noexcept {
+void PriorBank::Filters::take_between(const MeasuredInterval& interval, int which, bool about_point) noexcept {
   const std::ptrdiff_t a = wide_count(), M = lanes_;
   const auto [y, stated] = interval.measured(which, ny_);
   const double* const weights = about_point ? reading_weights(which) : stated;
@@ -424,7 +426,7 @@ void PriorBank::take_between(const MeasuredInterval& interval, int which, bool a
 }
 
 /// Of an interval without measurements between its nodes, linearised about `point_`: as `take_step` from the mean.
-void PriorBank::take_step_from_point() noexcept {
+void PriorBank::Filters::take_step_from_point() noexcept {
   const std::ptrdiff_t M = lanes_;
   const auto off = [&](std::ptrdiff_t entry, std::ptrdiff_t m) {
     return wide_mean_[entry * M + m] - point_[entry * M + m];
@@ -461,7 +463,7 @@ void PriorBank::take_step_from_point() noexcept {
 }
 
 /// Moves to the interval's end, linearised about `point_`: z+ = F z + q, and x as integrated from there.
-void PriorBank::narrow() noexcept {
+void PriorBank::Filters::narrow() noexcept {
   const std::ptrdiff_t a = wide_count(), M = lanes_;
   std::fill(transition_.begin(), transition_.end(), 0.0);
   const auto T = [&](std::ptrdiff_t r, std::ptrdiff_t c) { return transition_.data() + (c * n_ + r) * M; };

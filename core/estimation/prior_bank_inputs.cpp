@@ -3,12 +3,11 @@
 #include <cmath>
 
 #include "prior_bank_views.hpp"
-#include "rhec/core/estimation/prior_bank.hpp"
 
 namespace rhec {
 
 /// Moments of [x; z] of a lane.
-void PriorBank::view_member(int lane) noexcept {
+void PriorBank::Filters::view_member(int lane) noexcept {
   for (int c = 0; c < n_; ++c) {
     full_mean_[c] = mean_[c * lanes_ + lane];
     for (int r = 0; r < n_; ++r) full_covariance_(r, c) = covariance_[(c * n_ + r) * lanes_ + lane];
@@ -16,7 +15,7 @@ void PriorBank::view_member(int lane) noexcept {
 }
 
 /// The inputs of an interval; of those that are guessed, the mean of the most probable member.
-void PriorBank::begin_inputs(const MeasuredInterval& interval) noexcept {
+void PriorBank::Filters::begin_inputs(const MeasuredInterval& interval) noexcept {
   factors_->begin(interval.inputs);
   const bool is_any_missing =
       std::any_of(interval.inputs, interval.inputs + nu_, [](double u) { return std::isnan(u); });
@@ -31,12 +30,12 @@ void PriorBank::begin_inputs(const MeasuredInterval& interval) noexcept {
   }
 }
 
-double PriorBank::guessed_input(int input) const noexcept {
+double PriorBank::Filters::guessed_input(int input) const noexcept {
   return guesses_[static_cast<std::size_t>(most_probable())].mean(input);
 }
 
 /// Leaves out what parameters do that are held.
-void PriorBank::hold_factors() noexcept {
+void PriorBank::Filters::hold_factors() noexcept {
   const std::ptrdiff_t columns = nx_ + nu_ + 2 * np_;
   for (int p = 0; p < np_; ++p) {
     if (!factors_->is_held(p)) continue;
@@ -47,7 +46,7 @@ void PriorBank::hold_factors() noexcept {
 }
 
 /// Each member has its own, together with [x; z]. Of processes that are held nothing else knows.
-void PriorBank::widen_guesses() noexcept {
+void PriorBank::Filters::widen_guesses() noexcept {
   const std::ptrdiff_t a = wide_count(), M = lanes_;
   for (int p = 0; p < np_; ++p) {
     if (!factors_->is_held(p)) continue;
@@ -80,7 +79,7 @@ void PriorBank::widen_guesses() noexcept {
 }
 
 /// At the interval's end, with what was measured on the way.
-void PriorBank::take_guesses() noexcept {
+void PriorBank::Filters::take_guesses() noexcept {
   if (!guesses_.front().is_any_missing()) return;
   const std::ptrdiff_t a = wide_count(), M = lanes_;
   for (std::ptrdiff_t m = 0; m < M; ++m) {
@@ -104,7 +103,7 @@ void PriorBank::take_guesses() noexcept {
 }
 
 /// What the outputs of the interval's end have told.
-void PriorBank::update_guesses() noexcept {
+void PriorBank::Filters::update_guesses() noexcept {
   if (!guesses_.front().is_predicted()) return;
   for (int m = 0; m < lanes_; ++m) {
     view_member(m);

@@ -15,7 +15,7 @@ constexpr double from_elsewhere = -1.0;
 
 }  // namespace
 
-void PriorBank::check_map() const {
+void PriorBank::Filters::check_map() const {
   const Roles& roles = model_->description().roles;
   if (roles.position_x < 0 || roles.position_y < 0)
     throw Error(fmt::format("bank: the model '{}' does not say which states are its position; it has no place on a map",
@@ -42,7 +42,7 @@ void PriorBank::check_map() const {
 ///
 /// So what the map says is never an observation, which counts again at each node: however many nodes lie within the
 /// length, p is known from it with the deviation s.
-void PriorBank::follow_map() noexcept {
+void PriorBank::Filters::follow_map() noexcept {
   const Roles& roles = model_->description().roles;
   double *const means = map_means_.data(), *const variances = map_variances_.data();
   // Both places come from `find_distance`: of the mixture, before and after the interval.
@@ -93,13 +93,13 @@ void PriorBank::follow_map() noexcept {
   }
 }
 
-void PriorBank::add_offsets() noexcept {
+void PriorBank::Filters::add_offsets() noexcept {
   for (const Process& process : processes_)
     for (int m = 0; m < lanes_; ++m)
       mean_[static_cast<std::ptrdiff_t>(process.first) * lanes_ + m] += process.offset[m];
 }
 
-void PriorBank::take_share(double share, const double* mean, const double* covariance) noexcept {
+void PriorBank::Filters::take_share(double share, const double* mean, const double* covariance) noexcept {
   for (int m = 0; m < lanes_; ++m) {
     const auto own = [&](int r) -> double& { return mean_[static_cast<std::ptrdiff_t>(r) * lanes_ + m]; };
     for (int c = 0; c < n_; ++c) {
@@ -114,14 +114,14 @@ void PriorBank::take_share(double share, const double* mean, const double* covar
   if (share == 1.0) map_variances_[0] = from_elsewhere;
 }
 
-void PriorBank::add_saved_weights(const double* state, double* sums) const noexcept {
+void PriorBank::Filters::add_saved_weights(const double* state, double* sums) const noexcept {
   const double* const weights = state + mean_.size() + covariance_.size();
   for (int m = 0; m < members_; ++m) sums[m] += weights[m];
 }
 
-void PriorBank::forget_weights() noexcept { std::fill_n(weights_.begin(), members_, 1.0 / members_); }
+void PriorBank::Filters::forget_weights() noexcept { std::fill_n(weights_.begin(), members_, 1.0 / members_); }
 
-void PriorBank::take_noise(const PriorBank& other) noexcept {
+void PriorBank::Filters::take_noise(const Filters& other) noexcept {
   learnt_ = other.learnt_;
   spread_variances();
 }

@@ -17,7 +17,7 @@ constexpr double unknown_noise = 4.0, known_noise = 0.25;
 }  // namespace
 
 /// To what is stated.
-void PriorBank::reset_noise() noexcept {
+void PriorBank::Filters::reset_noise() noexcept {
   std::fill(learnt_.begin(), learnt_.end(), 0.0);
   std::fill_n(learnt_.begin() + ny_, ny_, unknown_noise);
   std::copy(setup_.output_variances.begin(), setup_.output_variances.end(), learnt_.begin());
@@ -31,7 +31,7 @@ void PriorBank::reset_noise() noexcept {
 /// certain too soon. Of n residuals the variance V of R relative to its square is 2 / n, the posterior of R is an
 /// inverse gamma distribution, and its mean is R (1 + V) in the first order (Gelman et al. 2013, section 3.3). Before
 /// anything is learnt, what is stated counts.
-void PriorBank::spread_variances(const double* weights) noexcept {
+void PriorBank::Filters::spread_variances(const double* weights) noexcept {
   for (int j = 0; j < ny_; ++j) {
     const double V = learnt_[ny_ + sensor_[j]];
     counted_[j] = learnt_[j] * (setup_.adapts_noise && V < unknown_noise ? 1.0 + V : 1.0);
@@ -41,7 +41,7 @@ void PriorBank::spread_variances(const double* weights) noexcept {
 }
 
 /// Derivatives of outputs with scale errors by these.
-void PriorBank::find_scale_slopes(const Frame& frame, const double* y) noexcept {
+void PriorBank::Filters::find_scale_slopes(const Frame& frame, const double* y) noexcept {
   const BankView& view = frame.view;
   for (const auto [output, state] : setup_.scaled_outputs) {
     if (std::isnan(y[output])) continue;
@@ -60,11 +60,11 @@ void PriorBank::find_scale_slopes(const Frame& frame, const double* y) noexcept 
   }
 }
 
-PriorBank::Noise PriorBank::noise(int output) const noexcept {
+PriorBank::Noise PriorBank::Filters::noise(int output) const noexcept {
   return {learnt_[output], counted_[output], !setup_.adapts_noise || learnt_[ny_ + sensor_[output]] < known_noise};
 }
 
-bool PriorBank::is_of_motion(int output) const noexcept {
+bool PriorBank::Filters::is_of_motion(int output) const noexcept {
   return std::ranges::binary_search(setup_.motion_outputs, output);
 }
 
@@ -81,7 +81,7 @@ bool PriorBank::is_of_motion(int output) const noexcept {
 ///
 /// Where a sensor has a robust loss, a function of nu^2 / S that falls again for outliers takes its place, so that they
 /// do not pass for noise (an M-estimator of scale: Huber 1981, chapter 5).
-void PriorBank::adapt_noise(const Frame& frame, const double* y) noexcept {
+void PriorBank::Filters::adapt_noise(const Frame& frame, const double* y) noexcept {
   constexpr double steady_gain = 0.015, most_squares = 9.0, least_information = 1e-3, most_change = 2.0;
   constexpr double drift = 2.0 * steady_gain * steady_gain;
   const int best = most_probable(), entries = frame.view.vehicle_states, states = frame.view.states;
@@ -138,7 +138,7 @@ void PriorBank::adapt_noise(const Frame& frame, const double* y) noexcept {
 
 /// Pseudo-Huber losses of the innovations, as weights of the outputs: s = sum of r^2 / S over a group, and the loss
 /// 2 delta^2 (sqrt(1 + s / delta^2) - 1) has the slope 1 / sqrt(1 + s / delta^2).
-void PriorBank::weigh_outputs(const Frame& frame, const double* y, int taken, const double* given) noexcept {
+void PriorBank::Filters::weigh_outputs(const Frame& frame, const double* y, int taken, const double* given) noexcept {
   for (int j = 0; j < ny_; ++j)
     std::fill_n(output_variances_.data() + static_cast<std::ptrdiff_t>(j) * lanes_, lanes_,
                 counted_[j] / (frame.weights ? frame.weights[j] : 1.0) + added_[j]);
@@ -159,11 +159,11 @@ void PriorBank::weigh_outputs(const Frame& frame, const double* y, int taken, co
   }
 }
 
-int PriorBank::most_probable() const noexcept {
+int PriorBank::Filters::most_probable() const noexcept {
   return static_cast<int>(std::max_element(weights_.begin(), weights_.begin() + members_) - weights_.begin());
 }
 
-double PriorBank::robust_weight(int output) const noexcept {
+double PriorBank::Filters::robust_weight(int output) const noexcept {
   // Noise that adapts has been spread anew since.
   const bool is_weighed = !stated_weights_.empty() && !setup_.robust.empty() && !setup_.adapts_noise;
   const double stated = is_weighed ? stated_weights_[output] : 1.0;
@@ -173,7 +173,7 @@ double PriorBank::robust_weight(int output) const noexcept {
 
 /// What a group of outputs with s = sum of nu^2 / S says of their noise, relative to s. The threshold does not follow a
 /// loss that is tighter: the noise may be several times what was stated, and must not pass for outliers either.
-double PriorBank::scale_weight(double s, double delta) noexcept {
+double PriorBank::Filters::scale_weight(double s, double delta) noexcept {
   constexpr double least_threshold = 4.0;
   const double threshold = std::max(delta, least_threshold), root = 1.0 + s / (threshold * threshold);
   return 1.0 / (root * root);
@@ -181,7 +181,7 @@ double PriorBank::scale_weight(double s, double delta) noexcept {
 
 /// For n outputs without outliers, s has a chi-square distribution: the mean of what they say of their noise, by
 /// Simpson's rule over r = sqrt(s), of which nothing is left at 12 standard deviations.
-void PriorBank::find_loss_scales() {
+void PriorBank::Filters::find_loss_scales() {
   constexpr int steps = 2000;
   loss_of_.assign(ny_, -1);
   for (std::size_t k = 0; k < setup_.robust.size(); ++k) {
@@ -205,7 +205,7 @@ void PriorBank::find_loss_scales() {
 }
 
 /// nu^2 / S - 1 in the mean over the sensor's outputs, without the outliers that a loss finds.
-double PriorBank::robust_surplus(const double* y, int sensor, int lane) const noexcept {
+double PriorBank::Filters::robust_surplus(const double* y, int sensor, int lane) const noexcept {
   double total = 0.0;
   int count = 0, place = 0;
   const auto surprise_at = [&](int each) { return surprises_[static_cast<std::ptrdiff_t>(each) * lanes_ + lane]; };

@@ -6,10 +6,10 @@
 #include <numbers>
 #include <vector>
 
+#include "prior_bank_filters.hpp"
 #include "rhec/core/base/aligned.hpp"
 #include "rhec/core/estimation/curvature.hpp"
 #include "rhec/core/estimation/kalman_filter.hpp"
-#include "rhec/core/estimation/prior_bank.hpp"
 #include "rhec/core/kernels/bank_kernels.hpp"
 
 #include "excitation.hpp"
@@ -17,7 +17,7 @@
 namespace rhec {
 
 /// Of a parameter.
-struct PriorBank::Process {
+struct PriorBank::Filters::Process {
   int first = 0, count = 0;  ///< entries of [x; z]: all states that any of its priors has
   /// Per kind of state: its place among them, or -1, and the variance with which a member that lacks it is filled up.
   std::array<int, process_state_kinds> place{};
@@ -32,7 +32,7 @@ struct PriorBank::Process {
 };
 
 /// What outputs of motion ask for: a filter on the mixture's [x; p], and the way to where an interval is linearised.
-struct PriorBank::LookAhead {
+struct PriorBank::Filters::LookAhead {
   KalmanFilter mixture;
   Excitation excitation;            ///< of slip: what it keeps stands behind the noise in `learnt_`
   std::vector<int> curved_outputs;  ///< of motion
@@ -57,7 +57,7 @@ struct PriorBank::LookAhead {
 };
 
 /// What the kernels are given.
-struct PriorBank::Views {
+struct PriorBank::Filters::Views {
   std::vector<BankProcess> processes;
   std::vector<BankOutput> outputs;  ///< room for n_y
   int taken = 0;                    ///< of them
@@ -68,7 +68,7 @@ struct PriorBank::Views {
 };
 
 /// The bank, or the wider vector that it is within an interval, with the outputs' gradients.
-struct PriorBank::Frame {
+struct PriorBank::Filters::Frame {
   BankView view;
   double* gradient;  ///< n_y x view.vehicle_states, lanes
   /// Means before: entry e of lane m is at e * before_entry + m * before_lane.

@@ -4,6 +4,7 @@
 #include <set>
 #include <vector>
 
+#include "support/largest.hpp"
 #include "view.hpp"
 
 namespace rhec {
@@ -34,8 +35,6 @@ class EveryPrior : public ::testing::TestWithParam<Case> {
  protected:
   const std::shared_ptr<Prior> prior_ = make(GetParam().name, GetParam().options);
 };
-
-double largest(const Eigen::MatrixXd& matrix) { return matrix.cwiseAbs().maxCoeff(); }
 
 /// The least eigenvalue of a covariance whose variances have been scaled to 1.
 double least_eigenvalue(const Eigen::MatrixXd& covariance) {

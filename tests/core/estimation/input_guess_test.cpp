@@ -7,12 +7,14 @@
 #include <limits>
 #include <vector>
 
+#include "support/largest.hpp"
+
 namespace rhec {
 namespace input_guess_test {
 
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+using testing::largest;
 
-double largest(const Eigen::MatrixXd& matrix) { return matrix.cwiseAbs().maxCoeff(); }
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
 struct Inputs : ::testing::Test {
   const std::vector<Variable> about = {

@@ -11,6 +11,7 @@
 
 #include "rhec/core/estimation/measurement.hpp"
 #include "support/cart.hpp"
+#include "support/largest.hpp"
 #include "support/linear_case.hpp"
 #include "support/turntable.hpp"
 
@@ -25,8 +26,6 @@ KalmanFilter filter_for(const std::shared_ptr<const Model>& model) {
   filter.covariance = initial_covariance(*model);
   return filter;
 }
-
-double largest(const Eigen::MatrixXd& matrix) { return matrix.cwiseAbs().maxCoeff(); }
 
 TEST(KalmanFilter, IsTheTextbooksOnALinearModel) {
   for (const bool ramps : {false, true}) {

@@ -7,14 +7,13 @@
 #include "rhec/core/estimation/kalman_filter.hpp"
 #include "rhec/core/estimation/prior_bank.hpp"
 #include "support/bank_case.hpp"
+#include "support/largest.hpp"
 #include "support/linear_case.hpp"
 
 namespace rhec {
 namespace prior_bank_inputs_test {
 
 using namespace testing;
-
-double largest(const Eigen::MatrixXd& matrix) { return matrix.cwiseAbs().maxCoeff(); }
 
 TEST(PriorBank, GuessesInputsAsAKalmanFilterDoes) {
   const auto model = linear_model<Hovercraft>();

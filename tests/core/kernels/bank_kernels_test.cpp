@@ -10,14 +10,14 @@
 
 #include "rhec/core/base/aligned.hpp"
 #include "rhec/core/kernels/kernel_sets.hpp"
+#include "support/largest.hpp"
 #include "support/random_qp.hpp"
 
 namespace rhec {
 namespace bank_kernels_test {
 
+using testing::largest;
 using testing::RandomQp;
-
-double largest(const Eigen::MatrixXd& matrix) { return matrix.cwiseAbs().maxCoeff(); }
 
 /// A bank with random moments, in both forms.
 struct RandomBank {

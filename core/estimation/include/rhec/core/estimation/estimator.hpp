@@ -142,7 +142,8 @@ class RHEC_EXPORT Estimator {
   void clip(Estimate& estimate) const noexcept;
   void predict_to(double time, Clock::time_point deadline) noexcept;
   void check_integration() noexcept;
-  void clear_estimates() noexcept, clear_deliveries() noexcept;
+  void clear_estimates() noexcept;
+  void clear_deliveries() noexcept;
 
   std::unique_ptr<EstimationMethod> method_;
   Timeline timeline_;

@@ -136,7 +136,8 @@ class RHEC_EXPORT KalmanFilter {
   void narrow() noexcept;
   void begin_inputs(const double* measured, const double* guess, double duration) noexcept;
   void hold_factors(double* jacobians, int count) const noexcept;
-  void add_guessed_inputs(const double*transition) noexcept, take_guessed_inputs() noexcept;
+  void add_guessed_inputs(const double* transition) noexcept;
+  void take_guessed_inputs() noexcept;
   void take_outputs(Measured y) noexcept;
   void linearise_outputs() noexcept;
   void find_scale_slopes(Measured y) noexcept;

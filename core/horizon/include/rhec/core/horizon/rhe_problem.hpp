@@ -11,6 +11,7 @@
 #include "rhec/core/horizon/blocking.hpp"
 #include "rhec/core/horizon/horizon_problem.hpp"
 #include "rhec/core/horizon/measured_interval.hpp"
+#include "rhec/core/horizon/rhe_problem_setup.hpp"
 
 namespace rhec {
 
@@ -18,13 +19,6 @@ class BetweenCache;
 class OutputCache;
 class PartsOfIntervals;
 struct CostView;
-
-/// Pseudo-Huber loss on a group of outputs (docs/method.md, section 2): with s the weighted squared residual of the
-/// group, 2 delta^2 (sqrt(1 + s / delta^2) - 1) replaces s. It is smooth, so that its exact Hessian exists.
-struct RobustLoss {
-  std::vector<int> outputs;  ///< these share one loss, e.g. the two coordinates of a position fix
-  double delta = 3.0;        ///< in standard deviations: transition from quadratic to linear
-};
 
 /// Receding horizon estimation over N intervals (docs/method.md, section 2; Wallace et al., eq. 2):
 ///
@@ -40,18 +34,7 @@ struct RobustLoss {
 /// starts), `finish` must be called.
 class RHEC_EXPORT RheProblem final : public HorizonProblem {
  public:
-  struct Setup {
-    int max_intervals = 15;
-    int substeps = 1;
-    int most_between = 0;                ///< measurements that an interval can have between its nodes
-    std::vector<double> output_weights;  ///< n_y, diagonal of Ry = 1 / sigma^2
-    std::vector<double> input_weights;   ///< n_u, diagonal of Ru
-    std::vector<RobustLoss> robust;
-    std::vector<int> one_block;                            ///< parameters with one value over the whole horizon
-    std::vector<double> state_lower, state_upper;          ///< n_x; empty: the model's own bounds
-    std::vector<double> input_lower, input_upper;          ///< n_u; empty: none, since inputs are measured
-    std::vector<double> parameter_lower, parameter_upper;  ///< n_p; empty: the model's own bounds
-  };
+  using Setup = RheProblemSetup;
   RheProblem(std::shared_ptr<const Model> model, Setup setup);
 
   const Setup& setup() const noexcept { return setup_; }
@@ -143,7 +126,8 @@ class RHEC_EXPORT RheProblem final : public HorizonProblem {
   struct BetweenBatch;
   struct OfPoints;
   struct ModelRows;
-  bool has_between() const noexcept, has_many(int interval) const noexcept;
+  bool has_between() const noexcept;
+  bool has_many(int interval) const noexcept;
   std::size_t between_scratch_size() const noexcept;
   double add_between(StageRange range, const Iterate& iterate, Hessian hessian, const CostView* view,
                      double* stage_costs, double* memory) const noexcept;
@@ -169,14 +153,17 @@ class RHEC_EXPORT RheProblem final : public HorizonProblem {
   void add_curvature_of_losses(BetweenBatch& batch, const CostView& view) const noexcept;
   double weigh(BetweenBatch& batch, int interval, int place, const double* predicted, double* weights, double* pulls,
                double* curvatures) const noexcept;
-  std::ptrdiff_t between_key_size() const noexcept, between_said_size() const noexcept;
+  std::ptrdiff_t between_key_size() const noexcept;
+  std::ptrdiff_t between_said_size() const noexcept;
   std::ptrdiff_t between_kept_size() const noexcept;
   double add_known_between(StageRange range, const Iterate& iterate, const CostView& view, BetweenCache& known,
                            double* memory) const noexcept;
-  double *H_of(const CostView&view, int stage) const noexcept, *h_of(const CostView&view, int stage) const noexcept;
+  double* H_of(const CostView& view, int stage) const noexcept;
+  double* h_of(const CostView& view, int stage) const noexcept;
   double inputs(int interval, const Iterate& iterate, double* H, double* h) const noexcept;
   double links(int interval, const Iterate& iterate, double* H, double* h) const noexcept;
-  void weigh_nodes() noexcept, write_bounds(int stage) noexcept;
+  void weigh_nodes() noexcept;
+  void write_bounds(int stage) noexcept;
   double arrival_term(const Iterate& iterate, double* q) const noexcept;
   double first_block_weight(int parameter) const noexcept;
 
