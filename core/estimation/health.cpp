@@ -41,7 +41,7 @@ const char* name_of_reason(std::uint32_t reason) noexcept {
   }
 }
 
-std::string in_words(const Health& health, const std::vector<Sensor>& sensors) {
+std::string in_words(const Health& health, const std::vector<Sensor>& sensors, const std::vector<Sensor>& inputs) {
   std::string text = name_of(health.level);
   const char* separator = ": ";
   const auto add = [&](const std::string& who, std::uint32_t reasons, const std::string& offset = "") {
@@ -61,7 +61,14 @@ std::string in_words(const Health& health, const std::vector<Sensor>& sensors) {
     if (sensor.rival >= 0) offset += " from " + sensors[static_cast<std::size_t>(sensor.rival)].name;
     add(sensors[s].name, sensor.reasons, offset);
   }
-  add("inputs", health.inputs.reasons);
+  const bool is_named = health.off_input >= 0 && health.off_input < std::ssize(inputs);
+  add("inputs", is_named ? health.inputs.reasons & ~reason::off : health.inputs.reasons,
+      health.inputs.offset == 0.0 ? "was off" : "off");
+  if (is_named) {
+    const Sensor& input = inputs[static_cast<std::size_t>(health.off_input)];
+    add("input " + input.name, health.inputs.reasons & reason::off,
+        fmt::format("off by about {:.2g} {}", health.inputs.offset, input.unit));
+  }
   return text;
 }
 

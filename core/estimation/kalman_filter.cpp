@@ -386,6 +386,9 @@ void KalmanFilter::carry(Deviations& deviations) noexcept {
         const double by = jacobian_[(c < nx_ ? c : nu_ + c) * nx_ + r];
         if (by != 0.0) sum += by * Eigen::Map<const Lanes>(rows + c * stride);
       }
+      for (Eigen::Index j = 0; j < deviations.by_input.rows(); ++j)
+        if (const double by = jacobian_[(nx_ + j) * nx_ + r]; by != 0.0)
+          sum += by * Eigen::Map<const Lanes>(deviations.by_input.data() + j * stride + first);
       Eigen::Map<Lanes>(carried_.data() + r * count()) = sum;
     }
     for (int r = 0; r < nx_; ++r)

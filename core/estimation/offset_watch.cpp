@@ -15,8 +15,8 @@ namespace {
 // samples that count. Where there are many, one of at least so many samples gives way; the oldest say nothing new.
 constexpr double strange = 2.0;
 constexpr int most_onsets = 7, young = 20, unproven = 10, oldest = 150;
-// The difference of two outputs shows at once: so many onsets of it are enough.
-constexpr int onsets_of_rivals = 3;
+// The difference of two outputs shows at once, and what an input is off by soon: so many onsets of these are enough.
+constexpr int onsets_of_rivals = 3, onsets_of_inputs = 3;
 // Errors of receivers last, as those by reflections. Until so many innovations tell, the squares of their sums are so
 // many times larger than those of independent errors.
 constexpr double correlation_of_receivers = 2.0, innovations_to_know = 150.0;
@@ -30,6 +30,10 @@ constexpr double memory = 100.0;
 constexpr double most_counted = 3.0;
 // The same of one that has lasted.
 constexpr double lasting = 9.0;
+// How far an input that is off leads an estimate depends on how much the estimator itself believes sensors, which may
+// be less than is said of them, since it learns: innovations then seem to say more of it. By such a share it is
+// corrected at once, and again while something is left.
+constexpr double share_of_input = 0.5;
 // An offset that differs from none by less than so many standard deviations is none.
 constexpr double negligible = 2.0;
 // By no more than so many is one known that innovations have said: slip makes some that look like one, too, and later
@@ -47,7 +51,7 @@ void add_square(const Vector& v, double scale, Eigen::MatrixXd& P) noexcept {
 
 }  // namespace
 
-OffsetWatch::OffsetWatch(const Model& model, const std::vector<Watched>& outputs, const KalmanFilter::Noise& noise,
+OffsetWatch::OffsetWatch(const Model& model, const std::vector<Watched>& watched, const KalmanFilter::Noise& noise,
                          double gate)
     : watched_of_(static_cast<std::size_t>(model.output_count()), -1),
       position_x_(model.description().roles.position_x),
@@ -55,24 +59,28 @@ OffsetWatch::OffsetWatch(const Model& model, const std::vector<Watched>& outputs
       parameter_lower_(noise.parameter_lower),
       parameter_upper_(noise.parameter_upper),
       limit_(gate * gate),
-      known_(outputs.size()) {
-  int slots = static_cast<int>(outputs.size());
-  const bool has_single = std::ranges::any_of(outputs, [](const Watched& each) { return each.rival < 0; });
+      known_(watched.size()) {
+  int slots = static_cast<int>(watched.size());
+  const auto is_single = [](const Watched& each) { return each.input < 0 && each.rival < 0; };
+  const bool has_single = std::ranges::any_of(watched, is_single);
   const int first_shared = slots;
   if (has_single) slots += most_onsets;
-  for (const Watched& each : outputs) {
-    const bool is_single = each.rival < 0;
-    watched_of_[each.output] = static_cast<int>(outputs_.size());
+  for (const Watched& each : watched) {
+    if (each.output >= 0) watched_of_[each.output] = static_cast<int>(outputs_.size());
     outputs_.push_back(each.output);
+    inputs_.push_back(each.input);
     rivals_.push_back(each.rival);
     searched_.push_back(each.is_searched);
     biases_.push_back(each.bias);
-    first_slot_.push_back(is_single ? first_shared : slots);
-    slots_.push_back(!each.is_searched ? 0 : is_single ? most_onsets : onsets_of_rivals);
-    if (!is_single) slots += slots_.back();
+    first_slot_.push_back(is_single(each) ? first_shared : slots);
+    const int own = each.input >= 0 ? onsets_of_inputs : onsets_of_rivals;
+    slots_.push_back(!each.is_searched ? 0 : is_single(each) ? most_onsets : own);
+    if (!is_single(each)) slots += slots_.back();
   }
-  for (const Watched& each : outputs) {
-    const Variable& about = model.description().outputs[static_cast<std::size_t>(each.output)];
+  const ModelDescription& description = model.description();
+  for (const Watched& each : watched) {
+    const Variable& about = each.input < 0 ? description.outputs[static_cast<std::size_t>(each.output)]
+                                           : description.inputs[static_cast<std::size_t>(each.input)];
     most_offset_.push_back(each.rival >= 0 ? infinity : impossible_offset * about.scale);
   }
   onsets_.resize(slots);
@@ -81,7 +89,9 @@ OffsetWatch::OffsetWatch(const Model& model, const std::vector<Watched>& outputs
   sensitivities_.columns = KalmanFilter::Deviations::Columns::Zero(n, lanes);
   for (auto* each : {&information_, &score_, &squares_, &count_, &is_sure_}) *each = Eigen::ArrayXd::Zero(lanes);
   is_off_ = Eigen::ArrayXXd::Zero(lanes, model.output_count());
-  for (std::size_t k = 0; k < outputs_.size(); ++k) is_off_(lane_of_known(k), outputs_[k]) = 1.0;
+  if (std::ranges::any_of(inputs_, [](int input) { return input >= 0; }))
+    sensitivities_.by_input = KalmanFilter::Deviations::Columns::Zero(model.input_count(), lanes);
+  for (std::size_t k = 0; k < outputs_.size(); ++k) mark(lane_of_known(k), static_cast<int>(k));
   reset();
 }
 
@@ -103,8 +113,7 @@ void OffsetWatch::forget_onsets() noexcept {
     const bool is_ever = m < outputs_.size() && searched_[m];
     onsets_[m] = {.watched = is_ever ? static_cast<int>(m) : -1, .age = 0};
     set(static_cast<int>(m), {});
-    is_off_.row(static_cast<Eigen::Index>(m)).setZero();
-    if (is_ever) is_off_(static_cast<Eigen::Index>(m), outputs_[m]) = 1.0;
+    mark(static_cast<int>(m), is_ever ? static_cast<int>(m) : -1);
   }
   // An offset that has always been there goes on as before.
   sensitivities_.columns.rightCols(sensitivities_.columns.cols() - std::ssize(outputs_)).setZero();
@@ -123,8 +132,24 @@ void OffsetWatch::find_used_lanes() noexcept {
   sensitivities_.used = (used + block - 1) / block * block;
 }
 
+/// What a lane's constant is that of; -1: of nothing.
+void OffsetWatch::mark(int lane, int watched) noexcept {
+  is_off_.row(lane).setZero();
+  if (sensitivities_.by_input.size() > 0) sensitivities_.by_input.col(lane).setZero();
+  if (watched < 0) return;
+  if (const int output = outputs_[static_cast<std::size_t>(watched)]; output >= 0) is_off_(lane, output) = 1.0;
+  if (const int input = inputs_[static_cast<std::size_t>(watched)]; input >= 0)
+    sensitivities_.by_input(input, lane) = 1.0;
+}
+
 void OffsetWatch::correct(double* outputs) const noexcept {
-  for (std::size_t k = 0; k < outputs_.size(); ++k) outputs[outputs_[k]] -= known_[k].value;
+  for (std::size_t k = 0; k < outputs_.size(); ++k)
+    if (outputs_[k] >= 0) outputs[outputs_[k]] -= known_[k].value;
+}
+
+void OffsetWatch::correct_inputs(double* inputs) const noexcept {
+  for (std::size_t k = 0; k < inputs_.size(); ++k)
+    if (inputs_[k] >= 0) inputs[inputs_[k]] -= known_[k].value;
 }
 
 bool OffsetWatch::has_any() const noexcept {
@@ -180,8 +205,7 @@ void OffsetWatch::begin(const Onset& onset) noexcept {
   const auto lane = static_cast<Eigen::Index>(least);
   onsets_[least] = onset;
   set(static_cast<int>(least), {});
-  is_off_.row(lane).setZero();
-  is_off_(lane, outputs_[watched]) = 1.0;
+  mark(static_cast<int>(least), watched);
   sensitivities_.columns.col(lane).setZero();
   find_used_lanes();
 }
@@ -265,6 +289,19 @@ void OffsetWatch::take(const WalkingFilter& filter, double excess,
     return std::max(known->correlation(), 1.0 + unknown * (correlation_of_receivers - 1.0));
   };
   const auto correlation_of = [&](int watched) { return correlation_by(whiteness_of(watched)); };
+  const auto is_strange = [&](int output) {
+    const KalmanFilter::Use use = filter.use(output);
+    return use.innovation * use.innovation > strange * strange * use.variance;
+  };
+  bool is_place_strange = false;
+  for (int j = 0; j < filter.model().output_count(); ++j) {
+    const bool sees_place = filter.depends_on(j, position_x_) || filter.depends_on(j, position_y_);
+    is_place_strange = is_place_strange || (sees_place && is_strange(j));
+  }
+  for (std::size_t k = 0; k < inputs_.size(); ++k) {
+    const int watched = static_cast<int>(k);
+    if (inputs_[k] >= 0 && (is_place_strange || !has_young(watched))) begin({.watched = watched, .excess = excess});
+  }
   const bool has_sure = is_sure_.maxCoeff() > 0.0;
   const auto correlation_of_output = [&](int output) {
     return has_sure && !whiteness.empty() ? correlation_by(whiteness[static_cast<std::size_t>(output)]) : 1.0;
@@ -273,8 +310,7 @@ void OffsetWatch::take(const WalkingFilter& filter, double excess,
     const KalmanFilter::Use use = filter.use(j);
     if (!(use.variance > 0.0)) continue;
     const double square = use.innovation * use.innovation / use.variance;
-    const bool is_strange = square > strange * strange;
-    if (const int k = watched_of_[j]; k >= 0 && searched_[k] && (is_strange || !has_young(k)))
+    if (const int k = watched_of_[j]; k >= 0 && searched_[k] && (is_strange(j) || !has_young(k)))
       begin({.watched = k,
              .excess = excess,
              .correlation = correlation_of(k),
@@ -314,7 +350,7 @@ void OffsetWatch::take(const WalkingFilter& filter, double excess,
     double significance = found.significance() / (is_end ? alone : usual);
     // Slip that has jumped does not just take back what an output was off by.
     if (is_end) significance += each.left_out;
-    if (!(significance > most) || !is_possible(each.watched, found.value())) continue;
+    if (!(significance > most) || !is_possible(each.watched, found.value()) || !leaves_possible(lane, filter)) continue;
     most = significance;
     candidate_ = lane;
   }
@@ -330,7 +366,7 @@ void OffsetWatch::take(const WalkingFilter& filter, double excess,
       return;
     }
   }
-  const bool is_measured = filter.use(outputs_[watched]).variance > 0.0;
+  const bool is_measured = outputs_[watched] < 0 || filter.use(outputs_[watched]).variance > 0.0;
   if (is_measured && most > (is_end ? improbable : limit_)) suspect_ = candidate_;
   probability_ = 1.0 / (1.0 + std::exp(0.5 * (even_odds - most)));
 }
@@ -385,6 +421,20 @@ bool OffsetWatch::is_possible(int watched, double change) const noexcept {
   return std::abs(known_[k].value + change) <= most_offset_[k];
 }
 
+/// Whether slip can be what it is without the constant of a lane: where that hardly shows, it explains what something
+/// else has done, and takes slip beyond its bounds for it.
+bool OffsetWatch::leaves_possible(int lane, const WalkingFilter& filter) const noexcept {
+  const Constant found = constant(lane);
+  const Eigen::Index np = std::ssize(parameter_lower_), nx = filter.mean().size() - np;
+  for (Eigen::Index j = 0; j < np; ++j) {
+    const double by = sensitivities_.columns(nx + j, lane), without = filter.mean()[nx + j] - by * found.value();
+    const double beyond = std::max(parameter_lower_[j] - without, without - parameter_upper_[j]);
+    const double variance = filter.covariance()(nx + j, nx + j) + by * by / found.information;
+    if (beyond > 0.0 && beyond * beyond > negligible * negligible * variance) return false;
+  }
+  return true;
+}
+
 void OffsetWatch::adopt_suspected(WalkingFilter& filter) noexcept {
   if (refuted_ >= 0) return withdraw(static_cast<std::size_t>(refuted_), filter);
   adopt_lane(suspect_, filter);
@@ -392,20 +442,30 @@ void OffsetWatch::adopt_suspected(WalkingFilter& filter) noexcept {
 
 void OffsetWatch::adopt_lane(int lane, WalkingFilter& filter) noexcept {
   const Constant found = constant(lane);
+  const int watched = onsets_[lane].watched;
   const auto sensitivity = sensitivities_.columns.col(lane);
   filter.mean() -= sensitivity * found.value();
   clip(filter.mean().tail(std::ssize(parameter_lower_)));
   add_square(sensitivity, 1.0 / found.information, filter.covariance());
-  adopt_mean(outputs_[onsets_[lane].watched], found.value(), 1.0 / found.information);
+  const double share = inputs_[static_cast<std::size_t>(watched)] < 0 ? 1.0 : share_of_input;
+  adopt_mean_of(watched, share * found.value(), 1.0 / found.information);
 }
 
 void OffsetWatch::adopt_mean(int output, double change, double variance) noexcept {
+  adopt_mean_of(watched_of_[static_cast<std::size_t>(output)], change, variance);
+}
+
+void OffsetWatch::adopt_mean_of(int watched, double change, double variance) noexcept {
   const double least = change / most_certain;
-  adopt(output, change, std::max(variance, least * least));
+  adopt_of(watched, change, std::max(variance, least * least), false);
 }
 
 void OffsetWatch::adopt(int output, double change, double variance, bool is_sure) noexcept {
-  const auto k = static_cast<std::size_t>(watched_of_[output]);
+  adopt_of(watched_of_[static_cast<std::size_t>(output)], change, variance, is_sure);
+}
+
+void OffsetWatch::adopt_of(int watched, double change, double variance, bool is_sure) noexcept {
+  const auto k = static_cast<std::size_t>(watched);
   Known& known = known_[k];
   known.value += change;
   known.age = 0;

@@ -12,7 +12,8 @@
 
 namespace rhec {
 
-/// Watches whether outputs are off by little for long, which a gate on single innovations does not see.
+/// Watches whether outputs, or measured inputs, are off by little for long, which a gate on single innovations does not
+/// see.
 ///
 /// An output that is off by a constant b since some time spoils the estimate by V b and the innovations by g b, with
 /// sensitivities V and g that go through the filter beside it (separate-bias estimation: Friedland 1969). What the
@@ -27,7 +28,8 @@ class OffsetWatch {
  public:
   static constexpr int for_good = 25;  ///< what has lasted for so many samples that count lasts for good
   struct Watched {
-    int output = 0;
+    int output = -1;  ///< -1: an input
+    int input = -1;   ///< -1: an output
     /// Another output of the position, of another device, that measures the same: only their difference is known, and
     /// which of the two is off is not. -1: none, the output is not one of the position.
     int rival = -1;
@@ -37,7 +39,7 @@ class OffsetWatch {
     bool is_searched = true;
   };
   /// `gate`: standard deviations by which an offset has to differ from none.
-  OffsetWatch(const Model& model, const std::vector<Watched>& outputs, const KalmanFilter::Noise& noise, double gate);
+  OffsetWatch(const Model& model, const std::vector<Watched>& watched, const KalmanFilter::Noise& noise, double gate);
 
   void reset() noexcept;
   /// The estimate has jumped: what offsets have done to it is not known any more.
@@ -45,6 +47,8 @@ class OffsetWatch {
 
   /// Takes offsets that are known out of outputs (n_y).
   void correct(double* outputs) const noexcept;
+  /// The same of measured inputs (n_u).
+  void correct_inputs(double* inputs) const noexcept;
   /// What goes along with the filter's predictions (`WalkingFilter::predict`).
   KalmanFilter::Deviations& sensitivities() noexcept { return sensitivities_; }
   /// What is not known of offsets that were adopted makes an innovation of a sensor's outputs (n_y) wider.
@@ -101,6 +105,12 @@ class OffsetWatch {
     const int k = watched_of_[static_cast<std::size_t>(output)];
     return k < 0 ? 0.0 : known_[static_cast<std::size_t>(k)].value;
   }
+  /// What an input is off by; 0 if it is right.
+  double input_offset(int input) const noexcept {
+    for (std::size_t k = 0; k < inputs_.size(); ++k)
+      if (inputs_[k] == input) return known_[k].value;
+    return 0.0;
+  }
   /// The output that says otherwise, where it is not known which of the two is off; -1: none.
   int rival(int output) const noexcept {
     const int k = watched_of_[static_cast<std::size_t>(output)];
@@ -117,10 +127,10 @@ class OffsetWatch {
   }
   /// Whether estimates are to be refined: there is one, or one is not improbable.
   bool is_in_doubt() const noexcept { return candidate_ >= 0 || has_any(); }
-  /// The output of one that has not said enough yet, and is more probable than not; -1: none.
-  int probable() const noexcept {
-    return candidate_ >= 0 && probability_ > 0.5 ? outputs_[static_cast<std::size_t>(onsets_[candidate_].watched)] : -1;
-  }
+  /// Which of those that are watched is more probably off than not, though that has not said enough yet; -1: none.
+  int probable() const noexcept { return candidate_ >= 0 && probability_ > 0.5 ? onsets_[candidate_].watched : -1; }
+  /// The output that is watched as this one; -1: it is an input.
+  int watched_output(int watched) const noexcept { return outputs_[static_cast<std::size_t>(watched)]; }
   bool has_recent() const noexcept;                                  ///< one that was adopted of late
   bool has_any_but(const std::vector<int>& outputs) const noexcept;  ///< of others than these
   /// Gives an estimate of [x; p] the mean and the covariance that it has if offsets are not known better than they are.
@@ -164,17 +174,22 @@ class OffsetWatch {
   void begin(const Onset& onset) noexcept;
   bool has_young(int watched) const noexcept;
   void note(const WalkingFilter& filter, int output, const KalmanFilter::Use& use, double correlation) noexcept;
+  void mark(int lane, int watched) noexcept;
   void adopt_lane(int lane, WalkingFilter& filter) noexcept;
+  void adopt_mean_of(int watched, double change, double variance) noexcept;
+  void adopt_of(int watched, double change, double variance, bool is_sure) noexcept;
   void widen_by(const WalkingFilter& filter, const Sensor& sensor, const double* outputs, int output, int lane,
                 Innovation& innovation) const noexcept;
   bool is_significant(std::size_t watched) const noexcept;
   bool is_possible(int watched, double change) const noexcept;
+  bool leaves_possible(int lane, const WalkingFilter& filter) const noexcept;
   bool ends(int watched, const Constant& change) const noexcept;
   void withdraw(std::size_t watched, WalkingFilter& filter) noexcept;
   void find_used_lanes() noexcept;
   void clip(Eigen::VectorXd::SegmentReturnType parameters) const noexcept;
 
-  std::vector<int> outputs_, rivals_, biases_;  ///< that are watched
+  std::vector<int> outputs_, inputs_;  ///< that are watched; in the place of one there is no other
+  std::vector<int> rivals_, biases_;
   std::vector<char> searched_;
   std::vector<int> first_slot_, slots_;  ///< by watched output, its places for onsets
   std::vector<int> watched_of_;          ///< by output, which of these it is; -1: none

@@ -178,13 +178,14 @@ bool SensorJudge::consider_other(const double* outputs, Finding& finding) noexce
   return false;
 }
 
-/// The output whose offset is more probable than not, and explains a position that has failed more than once: both
-/// together say enough. -1: none.
+/// Which of what is watched for offsets is more probably off than not, and explains a position that has failed more
+/// than once: both together say enough. -1: none.
 int SensorJudge::offset_in_dispute() noexcept {
   WalkingFilter& filter = own_->filter;
   const OffsetWatch& offsets = *memory_->offsets;
-  const int output = offsets.probable();
-  if (!is_disputed_ || disputed_samples_ > looked_for || output < 0 || sees_position(output)) return -1;
+  const int probable = offsets.probable(), output = probable < 0 ? -1 : offsets.watched_output(probable);
+  if (!is_disputed_ || disputed_samples_ > looked_for || probable < 0 || (output >= 0 && sees_position(output)))
+    return -1;
   bool is_position_explained = false;
   for (std::size_t s = 0; s < sensors_.size(); ++s) {
     const bool is_rejected = (findings_[s] & reason::rejected) != 0;
@@ -194,7 +195,7 @@ int SensorJudge::offset_in_dispute() noexcept {
     if (!passes || !sees_position(sensors_[s].outputs)) return -1;
     is_position_explained = true;
   }
-  return is_position_explained ? output : -1;
+  return is_position_explained ? probable : -1;
 }
 
 }  // namespace rhec

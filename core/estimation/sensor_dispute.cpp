@@ -464,7 +464,7 @@ bool SensorJudge::is_within_bounds(const Eigen::VectorXd& mean) const noexcept {
 bool SensorJudge::is_probably_slip() const noexcept {
   return is_disputed_ && disputed_samples_ <= fresh && slip_->is_active && slip_probability_ > probable &&
          memory_->was_calm && memory_->slip_beyond < Memory::impossible_slip && is_within_bounds(own_->filter.mean()) &&
-         (input_findings_ | inputs_.reasons) == 0;
+         ((input_findings_ | inputs_.reasons) & ~reason::off) == 0;
 }
 
 /// What was held back, and what was rejected last, is right after all.

@@ -25,12 +25,15 @@ constexpr double offset_gate = 7.0;
 // standard deviation of how much it moves slip.
 constexpr double impossibly_beyond = 4.0, usually_beyond = 0.75, at_its_bound = 0.5;
 
-/// The state that is an output's bias: it stays as it is, no other state moves with it, no other output has it, and the
-/// output is larger by it. -1: none.
-int bias_of(const WalkingFilter& filter, int output) {
-  const Model& model = filter.model();
+// Over which it is looked at what moves what [s].
+constexpr double short_time = 0.1;
+// The share of what an input does that slip need not explain.
+constexpr double explained_by_slip = 0.2;
+
+/// Derivatives of the state after a time [s] by [x; u; p], at a point where everything moves: of a vehicle that stands
+/// much else stays as it is.
+Eigen::MatrixXd jacobian_in_motion(const Model& model, double duration) {
   const int nx = model.state_count(), nu = model.input_count(), np = model.parameter_count();
-  // At a point where everything moves: of a vehicle that stands much else stays as it is.
   const ModelDescription& about = model.description();
   std::vector<double> state, inputs, parameters = nominal_values(about.parameters);
   for (const Variable& each : about.states) state.push_back(std::clamp(0.3 * each.scale, each.lower, each.upper));
@@ -40,7 +43,6 @@ int bias_of(const WalkingFilter& filter, int output) {
       parameters[k] = std::clamp(about.parameters[k].scale, about.parameters[k].lower, about.parameters[k].upper);
   const std::vector<double> data(model.data_count(), 0.0);
   Eigen::MatrixXd jacobian(nx, nx + nu + np);
-  const double duration = 0.1;
   model.integrate({.count = 1,
                    .states = state.data(),
                    .inputs = inputs.data(),
@@ -48,6 +50,15 @@ int bias_of(const WalkingFilter& filter, int output) {
                    .durations = &duration,
                    .data = data.data(),
                    .jacobians = jacobian.data()});
+  return jacobian;
+}
+
+/// The state that is an output's bias: it stays as it is, no other state moves with it, no other output has it, and the
+/// output is larger by it. -1: none.
+int bias_of(const WalkingFilter& filter, int output) {
+  const Model& model = filter.model();
+  const int nx = model.state_count();
+  const Eigen::MatrixXd jacobian = jacobian_in_motion(model, short_time);
   for (int i = 0; i < nx; ++i) {
     if (filter.derivative(output, i) != 1.0) continue;
     bool is_bias = true;
@@ -59,6 +70,32 @@ int bias_of(const WalkingFilter& filter, int output) {
     if (is_bias) return i;
   }
   return -1;
+}
+
+/// The measured inputs of which offsets show: speeds, of which no slip takes a share. What takes such a share is what
+/// an offset would be; and what works by a rate, as of steering, does what a drifting sensor seems to do.
+std::vector<int> watched_inputs(const Model& model) {
+  const ModelDescription& about = model.description();
+  const int nx = model.state_count(), nu = model.input_count(), np = model.parameter_count(),
+            measured = nu - static_cast<int>(about.noisy_states.size());
+  std::vector<int> watched;
+  if (about.roles.position_x < 0 || about.roles.position_y < 0) return watched;
+  Eigen::MatrixXd now = jacobian_in_motion(model, short_time), later = jacobian_in_motion(model, 2.0 * short_time);
+  const auto displacement_by = [&](const Eigen::MatrixXd& jacobian, int input) {
+    return std::hypot(jacobian(about.roles.position_x, nx + input), jacobian(about.roles.position_y, nx + input));
+  };
+  for (int i = 0; i < nx; ++i) now.row(i) /= about.states[static_cast<std::size_t>(i)].scale;
+  const auto by_slip = now.rightCols(np);
+  for (int j = 0; j < measured; ++j) {
+    const auto by_input = now.col(nx + j);
+    // Where a speed leads grows with the time, where a rate of something else leads with its square.
+    const double way = displacement_by(jacobian_in_motion(model, short_time), j);
+    if (!(way > 0.0) || displacement_by(later, j) > 3.0 * way) continue;
+    const Eigen::VectorXd rest =
+        np > 0 ? Eigen::VectorXd(by_input - by_slip * by_slip.colPivHouseholderQr().solve(by_input)) : by_input;
+    if (rest.norm() > explained_by_slip * by_input.norm()) watched.push_back(j);
+  }
+  return watched;
 }
 
 /// The outputs of which offsets show, by what a filter expects. Where the vehicle is, the offset of one output does
@@ -129,6 +166,8 @@ SensorJudge::SensorJudge(std::shared_ptr<const Model> model, const Setup& setup)
   if (initial.size() > 0 && (setup_.initial_mean.size() != size || initial.rows() != size || initial.cols() != size))
     throw Error(fmt::format("sensor watch: an initial mean of {} values, and a covariance of {} x {}; expected {}",
                             setup_.initial_mean.size(), initial.rows(), initial.cols(), size));
+  for (const Variable& each : model->description().inputs)
+    input_names_.push_back({.name = each.name, .outputs = {}, .unit = each.unit});
   for (int degrees = 0; degrees <= most_sensor_outputs; ++degrees) {
     limits_.push_back(degrees ? chi_square_limit(degrees, setup_.gate) : 0.0);
     close_limits_.push_back(degrees ? chi_square_limit(degrees, std::min(setup_.gate, close_gate)) : 0.0);
@@ -155,7 +194,10 @@ SensorJudge::SensorJudge(std::shared_ptr<const Model> model, const Setup& setup)
   memory_->loss = std::make_unique<InformationLoss>(model, filter_setup(setup_));
   own_->filter.expect();
   std::vector<OffsetWatch::Watched> watched;
-  if (setup_.offsets) watched = watched_outputs(own_->filter, setup_.noise.output_variances);
+  if (setup_.offsets) {
+    watched = watched_outputs(own_->filter, setup_.noise.output_variances);
+    for (const int input : watched_inputs(own_->filter.model())) watched.push_back({.input = input});
+  }
   memory_->offsets = std::make_unique<OffsetWatch>(*model, watched, setup_.noise, offset_gate);
   if (model->description().roles.heading >= 0)
     for (auto* each : {&memory_->search, &memory_->second_thought})
@@ -200,6 +242,7 @@ void SensorJudge::reset() noexcept {
   memory_->loss->reset();
   if (memory_->search) memory_->search->cancel();
   inputs_ = {};
+  off_input_ = -1;
   input_findings_ = 0;
   calm_samples_ = setup_.calm;
   held_count_ = innovation_count_ = 0;
@@ -253,6 +296,7 @@ void SensorJudge::clean_inputs(double* inputs) noexcept {
     input_findings_ |= reason::implausible;
     ++inputs_.rejected;
   }
+  memory_->offsets->correct_inputs(inputs);
 }
 
 void SensorJudge::advance(double duration, const double* inputs, const double* more_sigmas) noexcept {
@@ -543,6 +587,19 @@ void SensorJudge::note_offsets() noexcept {
       states_[s].rival = sensor_of(memory_->offsets->rival(j), sensors_);
     }
     if (states_[s].offset != 0.0) findings_[s] |= reason::off;
+  }
+  inputs_.offset = 0.0;
+  off_input_ = -1;
+  const std::vector<Variable>& about = own_->filter.model().description().inputs;
+  for (std::size_t j = 0; j < about.size(); ++j) {
+    const double offset = memory_->offsets->input_offset(static_cast<int>(j));
+    const bool is_worst =
+        off_input_ < 0 || std::abs(offset) / about[j].scale >
+                              std::abs(inputs_.offset) / about[static_cast<std::size_t>(off_input_)].scale;
+    if (offset == 0.0 || !is_worst) continue;
+    inputs_.offset = offset;
+    off_input_ = static_cast<int>(j);
+    input_findings_ |= reason::off;
   }
 }
 

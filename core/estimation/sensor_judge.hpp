@@ -29,6 +29,7 @@ class SensorJudge {
   ~SensorJudge();
 
   const std::vector<Sensor>& sensors() const noexcept { return sensors_; }
+  const std::vector<Sensor>& inputs() const noexcept { return input_names_; }
   const Setup& setup() const noexcept { return setup_; }
   bool is_active() const noexcept { return is_active_; }
   const std::vector<Held>& held() const noexcept { return held_; }
@@ -177,6 +178,7 @@ class SensorJudge {
 
   Setup setup_;
   std::vector<Sensor> sensors_;
+  std::vector<Sensor> input_names_;   ///< names and units
   std::vector<double> limits_;        ///< of nu' S^-1 nu, by the number of values
   std::vector<double> close_limits_;  ///< those of a closer gate
   std::vector<Record> records_;       ///< by sensor
@@ -201,6 +203,7 @@ class SensorJudge {
   int calm_samples_ = 0;              ///< without a finding, in a row
   std::vector<SensorHealth> states_;  ///< by sensor
   SensorHealth inputs_;
+  int off_input_ = -1;  ///< the one that `inputs_.offset` is of
   std::uint32_t input_findings_ = 0;
   std::vector<std::uint32_t> findings_;  ///< by sensor, of the last sample
   std::vector<int> quiet_;               ///< by sensor, samples since the last finding

@@ -11,6 +11,8 @@ SensorWatch::SensorWatch(std::shared_ptr<const Model> model, const Setup& setup)
 SensorWatch::~SensorWatch() = default;
 
 const std::vector<Sensor>& SensorWatch::sensors() const noexcept { return judge_->sensors(); }
+const std::vector<Sensor>& SensorWatch::inputs() const noexcept { return judge_->inputs(); }
+std::string SensorWatch::in_words(const Health& health) const { return rhec::in_words(health, sensors(), inputs()); }
 const SensorWatch::Setup& SensorWatch::setup() const noexcept { return judge_->setup(); }
 std::shared_ptr<const FilterMemo> SensorWatch::make_memo() { return judge_->make_memo(); }
 void SensorWatch::reset() noexcept { judge_->reset(); }

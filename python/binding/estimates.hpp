@@ -15,7 +15,7 @@ struct EstimateObject {
   std::vector<Innovation> innovations;  ///< `value.innovations` are these
   double microseconds = 0.0;            ///< that the estimator took
   std::shared_ptr<const ModelDescription> about;
-  std::shared_ptr<const std::vector<Sensor>> sensors;
+  std::shared_ptr<const std::vector<Sensor>> sensors, inputs;
 
   EstimateObject() = default;
   EstimateObject(const EstimateObject&) = delete;

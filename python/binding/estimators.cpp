@@ -25,7 +25,7 @@ using EstimatorHandle = std::shared_ptr<EstimatorObject>;
 /// What is made once of an estimator: with it come the names that its estimates share.
 struct NamedEstimator : EstimatorObject {
   std::shared_ptr<const ModelDescription> about;
-  std::shared_ptr<const std::vector<Sensor>> sensors;
+  std::shared_ptr<const std::vector<Sensor>> sensors, inputs;  ///< none where nobody judges
 };
 
 /// An estimate's state may go on behind the vehicle's with biases and scales of sensors, and values of motion; the
@@ -54,8 +54,9 @@ std::shared_ptr<NamedEstimator> make_estimator(const std::shared_ptr<RobotObject
   }
   made->estimator = hooked.make_estimator(start);
   made->about = described(hooked, *made->estimator);
-  made->sensors = std::make_shared<const std::vector<Sensor>>(
-      made->estimator->watch() ? made->estimator->watch()->sensors() : std::vector<Sensor>());
+  const SensorWatch* const watch = made->estimator->watch();
+  made->sensors = std::make_shared<const std::vector<Sensor>>(watch ? watch->sensors() : std::vector<Sensor>());
+  made->inputs = std::make_shared<const std::vector<Sensor>>(watch ? watch->inputs() : std::vector<Sensor>());
   return made;
 }
 
@@ -96,6 +97,7 @@ py::object estimate(NamedEstimator& self, double time, std::optional<double> dea
   auto made = std::make_unique<EstimateObject>();
   made->about = self.about;
   made->sensors = self.sensors;
+  made->inputs = self.inputs;
   made->take(*now);
   made->microseconds = microseconds;
   return py::cast(std::move(made));
@@ -262,7 +264,7 @@ void bind_estimates(py::module_& module) {
           [](const EstimateObject& self) {
             return self.value.health.level == HealthLevel::ok || self.sensors->empty()
                        ? std::string()
-                       : in_words(self.value.health, *self.sensors);
+                       : in_words(self.value.health, *self.sensors, *self.inputs);
           },
           "why the health is not ok, in words")
       .def_property_readonly(

@@ -292,4 +292,56 @@ class Tractor:
                 "hitch": lambda: numpy.array([self.psi - self.psi_trailer])}[sensor]()
 
 
-VEHICLES = {"bicycle": Bicycle, "rover": Rover, "two_receivers": TwoReceivers, "skid_steer": SkidSteer, "tracks": Tracks, "tractor": Tractor}
+class Slope:
+    """A farm vehicle across a slope, which pushes its axles aside; a receiver with two antennas, an encoder, a radar and a gyro."""
+    step, heading, inputs_every, inputs_late = 0.1, 2, 5, 0.01
+    sensors = (Sensor("gps", "position", ("x_gps", "y_gps"), 10, 7, 0.08, 0.02, 0.012, 0.010, 0.9),
+               Sensor("antennas", "angle", ("heading",), 10, 7, 0.08, 0.02, 0.006, 0.004, 0.9, zero=0.004),
+               Sensor("steering", "angle", ("delta",), 5, 2, 0.004, 0.0, 0.012, quantum=0.004),
+               Sensor("radar", "rate", ("ground_speed",), 10, 3, 0.05, 0.01, 0.05, 0.03),
+               Sensor("gyro", "rate", ("yaw_rate",), 1, 0, 0.003, 0.0, 0.006, zero=0.01, walk=0.0005))
+    wheelbase, ahead, left = 2.0, 0.5, -0.3
+    downhill, aside = 0.7, (0.035, 0.050)  # [rad]; side-slip of front and rear by lateral acceleration [rad s^2/m]
+
+    def __init__(self, noise, speed):
+        self.noise, self.speed, self.time = noise, speed, 0.0
+        self.x = self.y = self.psi = self.delta = self.v = self.yaw_rate = 0.0
+        self.slip, self.tilt, self.ground = Slip(noise, 0.0, 0.08), Slip(noise, 0.02, 0.15), Slip(noise, 0.5, 0.95)
+        self.front = self.rear = self.spin = 0.0
+        self.pace, self.phase = noise.uniform(0.1, 0.4), noise.uniform(0.0, 6.0)
+        self.inputs = numpy.zeros(2)
+
+    @classmethod
+    def configuration(cls, estimator):
+        return {"step": cls.step, "model": {"name": "bicycle_sideslip", "wheelbase": cls.wheelbase, "antenna_x": cls.ahead, "antenna_y": cls.left,
+                                            "outputs": ["x_gps", "y_gps", "heading", "delta", "ground_speed", "yaw_rate"]},
+                "noise": {"outputs": {"x_gps": 0.02, "y_gps": 0.02, "heading": 0.01, "delta": 0.017, "ground_speed": 0.1, "yaw_rate": 0.01},
+                          "inputs": {"v": 0.1, "delta_rate": 0.1}, "biases": {"yaw_rate": {"sigma": 0.02, "drift": 0.001}}},
+                "estimator": {"name": estimator, "horizon": "2 s", "initial": {"parameters": {"beta_front": 0, "beta_rear": 0}, "sigma": {"psi": 0.1}}}}
+
+    def advance(self):
+        wheels = self.speed * (1.0 + 0.1 * math.sin(0.3 * self.time))
+        most = min(0.3, self.wheelbase * 1.0 / max(self.v, 0.1)**2)  # whoever drives there takes bends slowly
+        turning = min(max(3.0 * (most * math.sin(self.pace * self.time + self.phase) - self.delta), -0.6), 0.6)
+        self.v += ((1.0 - self.slip.step()) * (1.0 - self.spin) * wheels - self.v) * TICK / 0.1
+        # Gravity pushes downhill, a bend outwards; tyres give way on soft ground, and after they have rolled for some way.
+        push = (9.81 * math.sin(self.tilt.step()) * math.sin(self.downhill - self.psi) - self.v * self.yaw_rate) / self.ground.step()
+        self.front += (self.aside[0] * push - self.front) * TICK * max(self.v, 0.1) / 0.5
+        self.rear += (self.aside[1] * push - self.rear) * TICK * max(self.v, 0.1) / 0.5
+        self.yaw_rate = self.v / self.wheelbase * (math.tan(self.delta + self.front) * math.cos(self.rear) - math.sin(self.rear))
+        self.x += TICK * self.v * math.cos(self.psi + self.rear)
+        self.y += TICK * self.v * math.sin(self.psi + self.rear)
+        self.psi += TICK * self.yaw_rate
+        self.delta += TICK * turning
+        self.time += TICK
+        self.inputs = numpy.array([wheels, turning])
+
+    def truth(self):
+        return numpy.array([self.x, self.y]), self.psi
+
+    def read(self, sensor):
+        return {"gps": lambda: antenna(self.x, self.y, self.psi, self.ahead, self.left), "antennas": lambda: numpy.array([self.psi]),
+                "steering": lambda: numpy.array([self.delta]), "radar": lambda: numpy.array([self.v]), "gyro": lambda: numpy.array([self.yaw_rate])}[sensor]()
+
+
+VEHICLES = {"bicycle": Bicycle, "rover": Rover, "two_receivers": TwoReceivers, "skid_steer": SkidSteer, "tracks": Tracks, "tractor": Tractor, "slope": Slope}

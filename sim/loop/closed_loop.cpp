@@ -167,7 +167,7 @@ RunLog run_closed_loop(const Scenario& scenario, const LoopHooks& hooks) {
     sample.relaxed = command.relaxed;
     sample.health = estimate.health.level;
     if (estimate.health.level != HealthLevel::ok && estimator->watch())
-      sample.findings = in_words(estimate.health, estimator->watch()->sensors());
+      sample.findings = estimator->watch()->in_words(estimate.health);
     sample.faults = world.take_faults();
     sample.estimator_us = estimate.report.preparation_us + estimate.report.feedback_us;
     sample.estimator_feedback_us = estimate.report.feedback_us;

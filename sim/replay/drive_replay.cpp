@@ -268,7 +268,7 @@ class Driver {
     entry.health = estimate.health.level;
     entry.fallback = estimate.fallback;
     if (entry.health != HealthLevel::ok && estimator_->watch())
-      entry.findings = in_words(estimate.health, estimator_->watch()->sensors());
+      entry.findings = estimator_->watch()->in_words(estimate.health);
     for (const Innovation& innovation : estimate.innovations) note(innovation);
     result_.solve_us.push_back(estimate.report.preparation_us + estimate.report.feedback_us);
     if (hooks_.sampled)

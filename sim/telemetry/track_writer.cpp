@@ -60,7 +60,7 @@ TrackSample track_sample(const LoopSample& sample, const Robot& robot, logs::Sta
   }
   result.health = estimate.health.level;
   if (result.health != HealthLevel::ok && sample.estimator->watch())
-    result.findings = in_words(estimate.health, sample.estimator->watch()->sensors());
+    result.findings = sample.estimator->watch()->in_words(estimate.health);
   if (sample.command) result.inputs = sample.command->inputs;
   if (sample.controller && about.roles.position_x >= 0 && about.roles.position_y >= 0) {
     result.plan = plan_of(*sample.controller, about.roles);

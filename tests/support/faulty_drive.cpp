@@ -33,7 +33,9 @@ class Truth {
     const bool is_steered = about.roles.speed >= 0;
     for (std::size_t j = 0; j < parameters_.size(); ++j) {
       const double wave = std::sin(distance_ / 9.0 + static_cast<double>(j));
-      parameters_[j] = is_steered ? 0.75 + 0.15 * wave : 0.1 + 0.05 * wave;
+      // A share of what is asked for, or an angle by which the vehicle is pushed aside, or a share that is lost.
+      const bool is_angle = about.parameters[j].unit == "rad";
+      parameters_[j] = is_angle ? 0.05 * wave : is_steered ? 0.75 + 0.15 * wave : 0.1 + 0.05 * wave;
     }
     parameters_[0] -= fallen;
     if (is_steered)
@@ -45,7 +47,8 @@ class Truth {
       model_.rates(state.data(), inputs.data(), parameters_.data(), slopes_.data());
       for (Eigen::Index j = 0; j < state.size(); ++j) state[j] += slopes_[static_cast<std::size_t>(j)] * step_ / parts;
     }
-    distance_ += is_steered ? speed * parameters_[0] * step_ : speed * step_;
+    const bool is_share = is_steered && about.parameters[0].unit != "rad";
+    distance_ += is_share ? speed * parameters_[0] * step_ : speed * step_;
     time_ += step_;
   }
   double slip() const { return parameters_[0]; }  ///< of the last interval
@@ -148,7 +151,7 @@ Episode drive_with_fault(const Robot& robot, const Fault& fault, std::uint64_t s
                         estimate.covariance.allFinite();
     std::vector<Episode::Sample>& part = since < 0 ? episode.before : is_on ? episode.during : episode.after;
     part.push_back({error.norm(), error.dot(P.ldlt().solve(error)) < within, estimate.health.level,
-                    estimator->watch() ? in_words(estimate.health, estimator->watch()->sensors()) : "",
+                    estimator->watch() ? estimator->watch()->in_words(estimate.health) : "",
                     estimate.parameters[0] - slip,
                     std::sqrt(estimate.covariance(model.state_count(), model.state_count()))});
   }

@@ -58,6 +58,21 @@ estimator:
                                               "robot")};
 }
 
+/// A farm vehicle whose axles slip sideways, with a compass: nothing of it says that its wheels slip along.
+inline Robot with_sideslip(const std::string& estimator) {
+  return {host(), RobotOptions::table().parse(parse_yaml(R"(
+step: 0.2
+model: {name: bicycle_sideslip, outputs: [x_gps, y_gps, delta, heading]}
+noise: {outputs: {x_gps: 0.03, y_gps: 0.03, delta: 0.01, heading: 0.01}, inputs: {v: 0.1, delta_rate: 0.05}}
+estimator:
+  name: )" + estimator + R"(
+  horizon: 15
+  initial: {sigma: {x: 0.05, y: 0.05, psi: 0.03, delta: 0.02, beta_front: 0.1, beta_rear: 0.1}}
+)",
+                                                         "robot"),
+                                              "robot")};
+}
+
 struct SensorFaults : ::testing::TestWithParam<const char*> {
   Robot vehicle = watched_robot(GetParam());
   static constexpr int seeds = 4;

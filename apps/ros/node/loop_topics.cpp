@@ -171,8 +171,7 @@ void Loop::tell(const Estimate& estimate, logs::Stamp when, double time, const C
 void Loop::tell_health(const Estimate& estimate, logs::Stamp when) {
   told_health_ = Clock::now();
   if (estimate.health.level != told_level_)
-    say(estimator_->watch() ? rhec::in_words(estimate.health, estimator_->watch()->sensors())
-                            : rhec::name_of(estimate.health.level));
+    say(estimator_->watch() ? estimator_->watch()->in_words(estimate.health) : rhec::name_of(estimate.health.level));
   told_level_ = estimate.health.level;
   if (diagnostics_writer_ < 0) return;
   std::vector<sim::DiagnosticValue> values{{"driving", in_words(driving_)},
@@ -191,7 +190,7 @@ void Loop::tell_health(const Estimate& estimate, logs::Stamp when) {
         {"obstacles", fmt::format("{} seen, {} regarded", report_.obstacles_seen, report_.obstacles_regarded)});
   if (time_.is_simulated()) values.push_back({"jumps of the time", std::to_string(jumps_)});
   const std::string findings = estimate.health.level != HealthLevel::ok && estimator_->watch()
-                                   ? rhec::in_words(estimate.health, estimator_->watch()->sensors())
+                                   ? estimator_->watch()->in_words(estimate.health)
                                    : rhec::name_of(estimate.health.level);
   const bool has_rival = std::exchange(has_rival_, false);
   if (has_rival) values.push_back({"transform", "sent by another node, too, from " + rival_parent_});

@@ -102,7 +102,7 @@ Result drive(const char* estimator_name, const Timing& timing, const Fault& faul
     const Estimate& estimate = estimator->estimate(asked);
     const Eigen::Vector4d& there = states[static_cast<std::size_t>(std::lround(asked / step))];
     result.samples.push_back({(estimate.state.head<2>() - there.head<2>()).norm(), estimate.health.level,
-                              in_words(estimate.health, estimator->watch()->sensors())});
+                              estimator->watch()->in_words(estimate.health)});
     EXPECT_NE(result.samples.back().words, "degraded") << fault.name << " at " << asked << ": and why?";
     result.last = estimate;
   }

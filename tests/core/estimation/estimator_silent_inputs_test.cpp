@@ -69,7 +69,7 @@ Seen drive(const Robot& vehicle, std::uint64_t seed, double from, double to, dou
         seen.lost += now.health.level == HealthLevel::lost;
         seen.errors.push_back(away.norm());
         seen.widest = std::max(seen.widest, std::sqrt(now.covariance(0, 0) + now.covariance(1, 1)));
-        seen.words = in_words(now.health, estimator->watch()->sensors());
+        seen.words = estimator->watch()->in_words(now.health);
       }
     }
     truth += tick * Eigen::Vector4d(0.9 * speed * std::cos(truth[2]), 0.9 * speed * std::sin(truth[2]),

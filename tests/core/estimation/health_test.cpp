@@ -27,6 +27,14 @@ TEST(Health, InWords) {
   EXPECT_EQ(in_words(health, sensors),
             "degraded: x_gps and y_gps rejected and moved; delta was off from x_gps and y_gps; inputs implausible");
   health.sensors[1] = {};
+  health.inputs = {.reasons = reason::implausible | reason::off, .offset = 0.234};
+  health.off_input = 1;
+  EXPECT_EQ(in_words(health, sensors, {{"v", {}, "m/s"}, {"omega", {}, "rad/s"}}),
+            "degraded: x_gps and y_gps rejected and moved; inputs implausible; input omega off by about 0.23 rad/s");
+  EXPECT_EQ(in_words(health, sensors), "degraded: x_gps and y_gps rejected and moved; inputs implausible and off");
+  health.inputs.offset = 0.0;
+  health.off_input = -1;
+  EXPECT_EQ(in_words(health, sensors), "degraded: x_gps and y_gps rejected and moved; inputs implausible and was off");
   health = {.level = HealthLevel::lost, .reasons = reason::uncertain, .sensors = health.sensors, .inputs = {}};
   EXPECT_EQ(in_words(health, sensors), "lost: uncertain; x_gps and y_gps rejected and moved");
 }

@@ -107,13 +107,15 @@ TEST(KalmanFilter, CarriesDeviationsAsItMovesTheMean) {
   const double inputs[] = {0.3, -0.2}, zeros[] = {0.0, 0.0};
   KalmanFilter filter = filter_for(model);
   const Eigen::Index n = filter.mean.size();
-  KalmanFilter::Deviations moved{.columns = 0.1 * Eigen::MatrixXd::Random(n, 7), .used = 6};
+  KalmanFilter::Deviations moved{
+      .columns = 0.1 * Eigen::MatrixXd::Random(n, 7), .by_input = 0.1 * Eigen::MatrixXd::Random(2, 7), .used = 6};
   const Eigen::MatrixXd before = moved.columns;
   std::vector<Eigen::VectorXd> ends;
   for (Eigen::Index m = 0; m < moved.used; ++m) {
     KalmanFilter other = filter_for(model);
     other.mean += before.col(m);
-    other.predict(inputs, zeros, 0.2);
+    const Eigen::Vector2d off = Eigen::Vector2d(inputs[0], inputs[1]) + moved.by_input.col(m);
+    other.predict(off.data(), zeros, 0.2);
     ends.push_back(other.mean);
   }
   filter.predict(inputs, zeros, 0.2);

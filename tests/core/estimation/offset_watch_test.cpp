@@ -39,9 +39,10 @@ struct WatchedBoat {
     filter.covariance() = 0.01 * Eigen::MatrixXd::Identity(4, 4);
     if (walk == 0.0) filter.covariance()(3, 3) = 0.0;
   }
-  void take(std::vector<double> outputs, bool counts = true) {
-    const double input = 0.2;
+  void take(std::vector<double> outputs, bool counts = true, double input_off = 0.0) {
+    double input = 0.2 + input_off;
     watch.correct(outputs.data());
+    watch.correct_inputs(&input);
     filter.predict(&input, 0.1, nullptr, &watch.sensitivities());
     filter.expect();
     filter.update(outputs.data());
@@ -90,6 +91,48 @@ TEST(OffsetWatch, TakesOutWhatAnOffsetHasDone) {
   EXPECT_NEAR(misled.watch.offset(rate), offset, 1e-9);
   EXPECT_LT((misled.filter.mean() - told.filter.mean()).norm(), 1e-9);
   EXPECT_EQ(misled.watch.offset(0), 0.0);
+}
+
+/// The same of a measured input: what it has done is taken out at once, and it itself by and by.
+TEST(OffsetWatch, TakesOutWhatAnInputIsOffBy) {
+  constexpr double input_off = 0.15;
+  TrueBoat truth;
+  WatchedBoat misled, told;
+  for (WatchedBoat* boat : {&misled, &told}) boat->watch = OffsetWatch(*boat->model, {{.input = 0}}, boat->noise, gate);
+  int adopted = 0;
+  for (int k = 0; k < 600; ++k) {
+    const std::vector<double> outputs = truth.measure(0.0, 0.0);
+    misled.take(outputs, true, input_off);
+    told.take(outputs);
+    if (!misled.watch.has_suspect()) continue;
+    EXPECT_EQ(misled.watch.suspected(), -1);  // no output
+    const double before = (misled.filter.mean() - told.filter.mean()).norm();
+    misled.watch.adopt_suspected(misled.filter);
+    // No innovation counts as more than three standard deviations, so that what is found is a little less.
+    EXPECT_LT((misled.filter.mean() - told.filter.mean()).norm(), before) << k;
+    ++adopted;
+    EXPECT_LE(misled.watch.input_offset(0), input_off + 1e-9);
+  }
+  EXPECT_GE(adopted, 2);
+  EXPECT_NEAR(misled.watch.input_offset(0), input_off, 0.03);
+}
+
+/// An offset that would leave slip where it cannot be is not what is wrong.
+TEST(OffsetWatch, FindsNoneThatTakesSlipBeyondItsBounds) {
+  const double known = WatchedBoat().filter.mean()[3];
+  for (const bool is_within : {true, false}) {
+    TrueBoat truth;
+    WatchedBoat boat;
+    KalmanFilter::Noise bounded = boat.noise;
+    bounded.parameter_lower = {known + (is_within ? -1.0 : 1.0)};
+    boat.watch = OffsetWatch(*boat.model, {{.output = rate}}, bounded, gate);
+    bool is_found = false;
+    for (int k = 0; k < 200; ++k) {
+      boat.take(truth.measure(0.0, k < 30 ? 0.0 : offset));
+      is_found = is_found || boat.watch.has_suspect();
+    }
+    EXPECT_EQ(is_found, is_within);
+  }
 }
 
 /// No offset is larger than ten typical magnitudes: one that is known does not grow beyond that.

@@ -59,7 +59,7 @@ Seen drive(const std::string& estimator_name, bool has_bias, double jump, bool r
                                       .data());
     if (i % 20 == 19) {
       const Estimate& now = estimator->estimate(time);
-      const std::string words = in_words(now.health, estimator->watch()->sensors());
+      const std::string words = estimator->watch()->in_words(now.health);
       seen.has_moved = seen.has_moved || words.find("moved") != std::string::npos;
       if (time > 60.0) {
         ++samples;

@@ -1,7 +1,9 @@
 // What is watched at every sample: nothing is found where nothing is wrong, and inputs are those that can be.
 #include <gtest/gtest.h>
 
+#include <cstdint>
 #include <limits>
+#include <string>
 
 #include "support/sensor_faults.hpp"
 
@@ -26,6 +28,40 @@ TEST_P(JudgedSamples, AnImpossibleInputIsNotUsed) {
     SCOPED_TRACE(value);
     expect_each({.spoil = [=](Delivery& d) { d.inputs[0] = value; }},
                 [](const Episode& episode) { EXPECT_LE(episode.samples_to_recover(usual_error), 1); });
+  }
+}
+
+/// A speed of which no slip takes a share, measured too high for good, as by wheels that slip along.
+TEST_P(JudgedSamples, ASpeedThatIsOffForGoodIsUsedWithoutThat) {
+  constexpr double off = 0.4;  // [m/s]
+  vehicle = with_sideslip(GetParam());
+  for (int seed = 1; seed <= seeds; ++seed) {
+    SCOPED_TRACE(seed);
+    const Fault fault{.spoil = [](Delivery& d) { d.inputs[0] += off; }, .length = 200};
+    const Episode episode = drive_with_fault(vehicle, fault, static_cast<std::uint64_t>(seed));
+    EXPECT_TRUE(episode.is_finite);
+    EXPECT_GE(episode.honest_share(), 0.95);
+    double told = 0.0;
+    for (std::size_t k = 40; k < episode.during.size(); ++k) {
+      const Episode::Sample& sample = episode.during[k];
+      EXPECT_LT(sample.error, 0.15) << k;
+      if (const auto at = sample.words.find("input v off by about "); at != std::string::npos)
+        told = std::stod(sample.words.substr(at + std::string("input v off by about ").size()));
+    }
+    EXPECT_NEAR(told, off, 0.1);
+    EXPECT_EQ(episode.after.back().health, HealthLevel::ok) << episode.after.back().words;
+  }
+}
+
+/// Of one that slip takes a share of, slip tells.
+TEST_P(JudgedSamples, ASpeedThatSlipExplainsIsNotSaidToBeOff) {
+  for (int seed = 1; seed <= seeds; ++seed) {
+    SCOPED_TRACE(seed);
+    const Fault fault{.spoil = [](Delivery& d) { d.inputs[0] *= 1.1; }, .length = 150};
+    const Episode episode = drive_with_fault(vehicle, fault, static_cast<std::uint64_t>(seed));
+    for (const Episode::Sample& sample : episode.during)
+      EXPECT_EQ(sample.words.find("input "), std::string::npos) << sample.words;
+    EXPECT_LT(episode.during.back().error, usual_error);
   }
 }
 

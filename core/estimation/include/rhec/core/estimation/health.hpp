@@ -36,7 +36,7 @@ struct SensorHealth {
   std::uint32_t reasons = 0;  ///< at present; 0: none
   std::int64_t accepted = 0;  ///< measurements since the start
   std::int64_t rejected = 0;  ///< likewise
-  /// What is taken out of its values, in their unit; of several outputs the length of all. 0: nothing.
+  /// What is taken out of its values, in their unit; of several outputs the norm of all. 0: nothing.
   double offset = 0.0;
   /// The sensor from which it differs by that much, where it is not known which of the two is off; -1: none.
   int rival = -1;
@@ -48,6 +48,7 @@ struct Health {
   std::uint32_t reasons = 0;          ///< that belong to no sensor
   std::vector<SensorHealth> sensors;  ///< as `sensors_of`; empty where nobody judges
   SensorHealth inputs;                ///< the measured inputs as a whole
+  int off_input = -1;                 ///< the input that is off by `inputs.offset`; -1: none
   /// By how much larger the covariance that is given out is than the estimator's own, since innovations are correlated.
   double covariance_factor = 1.0;
 };
@@ -70,6 +71,8 @@ RHEC_EXPORT const char* name_of(HealthLevel level) noexcept;
 /// One word for a single reason, e.g. "stuck".
 RHEC_EXPORT const char* name_of_reason(std::uint32_t reason) noexcept;
 /// A health in words, e.g. "degraded: x_gps and y_gps rejected; inputs implausible".
-RHEC_EXPORT std::string in_words(const Health& health, const std::vector<Sensor>& sensors);
+/// Names and units of `inputs`, or none: an input that is off is then told without.
+RHEC_EXPORT std::string in_words(const Health& health, const std::vector<Sensor>& sensors,
+                                 const std::vector<Sensor>& inputs = {});
 
 }  // namespace rhec

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "rhec/core/estimation/estimate.hpp"
@@ -40,6 +41,9 @@ class RHEC_EXPORT SensorWatch {
   ~SensorWatch();
 
   const std::vector<Sensor>& sensors() const noexcept;
+  /// The measured inputs, with their names and units.
+  const std::vector<Sensor>& inputs() const noexcept;
+  std::string in_words(const Health& health) const;
   const Setup& setup() const noexcept;
   std::shared_ptr<const FilterMemo> make_memo();  ///< see EstimationMethod::listen
   void reset() noexcept;
