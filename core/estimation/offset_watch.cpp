@@ -268,6 +268,22 @@ void OffsetWatch::widen_by_candidate(const WalkingFilter& filter, const Sensor& 
   innovation.nis = squared_size(innovation.value, innovation.covariance);
 }
 
+namespace {
+
+/// By how much larger squares of sums of innovations are than those of independent ones; 1 where it is not watched.
+double correlation_by(const InnovationWhiteness* known) noexcept {
+  if (!known) return 1.0;
+  const double unknown = std::max(0.0, 1.0 - static_cast<double>(known->count()) / innovations_to_know);
+  return std::max(known->correlation(), 1.0 + unknown * (correlation_of_receivers - 1.0));
+}
+
+/// Whether an output that the filter has used was far from what it expected.
+bool is_strange(const KalmanFilter::Use& use) noexcept {
+  return use.variance > 0.0 && use.innovation * use.innovation > strange * strange * use.variance;
+}
+
+}  // namespace
+
 /// One output after the other, as the filter has done it: innovations of a sample are then independent.
 void OffsetWatch::take(const WalkingFilter& filter, double excess,
                        std::span<const InnovationWhiteness* const> whiteness, bool counts) noexcept {
@@ -283,77 +299,30 @@ void OffsetWatch::take(const WalkingFilter& filter, double excess,
     if (whiteness.empty() || rivals_[watched] < 0) return nullptr;
     return whiteness[static_cast<std::size_t>(outputs_[watched])];
   };
-  const auto correlation_by = [](const InnovationWhiteness* known) {
-    if (!known) return 1.0;
-    const double unknown = std::max(0.0, 1.0 - static_cast<double>(known->count()) / innovations_to_know);
-    return std::max(known->correlation(), 1.0 + unknown * (correlation_of_receivers - 1.0));
-  };
-  const auto correlation_of = [&](int watched) { return correlation_by(whiteness_of(watched)); };
-  const auto is_strange = [&](int output) {
-    const KalmanFilter::Use use = filter.use(output);
-    return use.innovation * use.innovation > strange * strange * use.variance;
-  };
-  bool is_place_strange = false;
-  for (int j = 0; j < filter.model().output_count(); ++j) {
-    const bool sees_place = filter.depends_on(j, position_x_) || filter.depends_on(j, position_y_);
-    is_place_strange = is_place_strange || (sees_place && is_strange(j));
-  }
-  for (std::size_t k = 0; k < inputs_.size(); ++k) {
-    const int watched = static_cast<int>(k);
-    if (inputs_[k] >= 0 && (is_place_strange || !has_young(watched))) begin({.watched = watched, .excess = excess});
-  }
+  begin_inputs(filter, excess);
   const bool has_sure = is_sure_.maxCoeff() > 0.0;
-  const auto correlation_of_output = [&](int output) {
-    return has_sure && !whiteness.empty() ? correlation_by(whiteness[static_cast<std::size_t>(output)]) : 1.0;
-  };
   for (int j = 0; j < filter.model().output_count(); ++j) {
     const KalmanFilter::Use use = filter.use(j);
     if (!(use.variance > 0.0)) continue;
     const double square = use.innovation * use.innovation / use.variance;
-    if (const int k = watched_of_[j]; k >= 0 && searched_[k] && (is_strange(j) || !has_young(k)))
+    if (const int k = watched_of_[j]; k >= 0 && searched_[k] && (is_strange(use) || !has_young(k)))
       begin({.watched = k,
              .excess = excess,
-             .correlation = correlation_of(k),
+             .correlation = correlation_by(whiteness_of(k)),
              .first = whiteness_of(k) ? whiteness_of(k)->count() : 0,
              .left_out = std::max(0.0, square - most_counted * most_counted)});
-    note(filter, j, use, correlation_of_output(j));
+    const bool is_correlated = has_sure && !whiteness.empty();
+    note(filter, j, use, is_correlated ? correlation_by(whiteness[static_cast<std::size_t>(j)]) : 1.0);
   }
-  suspect_ = refuted_ = candidate_ = -1;
-  for (std::size_t k = 0; k < known_.size(); ++k) {
-    Known& known = known_[k];
-    known.age += counts;
-    if (!known.is_off) continue;
-    if (!is_significant(k)) refuted_ = static_cast<int>(k);
-    if (rivals_[k] < 0) continue;
-    known.by_x = filter.derivative(outputs_[k], position_x_);
-    known.by_y = filter.derivative(outputs_[k], position_y_);
-  }
+  age(filter, counts);
   // What an offset does is in the correlation, too: one that has always been there has the least of late.
-  for (int k = 0; k < std::ssize(outputs_); ++k) onsets_[k].correlation = correlation_of(k);
+  for (int k = 0; k < std::ssize(outputs_); ++k) onsets_[k].correlation = correlation_by(whiteness_of(k));
   for (const Onset& each : onsets_)
     if (each.watched >= 0) {
       Onset& ever = onsets_[static_cast<std::size_t>(each.watched)];
       ever.correlation = std::min(ever.correlation, each.correlation);
     }
-  double most = improbable;
-  for (std::size_t m = 0; m < onsets_.size(); ++m) {
-    Onset& each = onsets_[m];
-    if (each.watched < 0) continue;
-    each.age += counts;
-    // What an offset does is in the excess, too, but not before it began.
-    const double alone = m < outputs_.size() ? excess : std::min(excess, each.excess), usual = alone * each.correlation;
-    const int lane = static_cast<int>(m);
-    // None is more significant than what it explains.
-    if (!(score_[lane] * score_[lane] > (most - each.left_out) * alone * information_[lane])) continue;
-    const Constant found = constant(lane);
-    const bool is_end = ends(each.watched, found);
-    double significance = found.significance() / (is_end ? alone : usual);
-    // Slip that has jumped does not just take back what an output was off by.
-    if (is_end) significance += each.left_out;
-    if (!(significance > most) || !is_possible(each.watched, found.value()) || !leaves_possible(lane, filter)) continue;
-    most = significance;
-    candidate_ = lane;
-  }
+  double most = find_candidate(filter, excess);
   if (candidate_ < 0) return;
   const int watched = onsets_[candidate_].watched;
   const bool is_end = ends(watched, constant(candidate_));
@@ -369,6 +338,56 @@ void OffsetWatch::take(const WalkingFilter& filter, double excess,
   const bool is_measured = outputs_[watched] < 0 || filter.use(outputs_[watched]).variance > 0.0;
   if (is_measured && most > (is_end ? improbable : limit_)) suspect_ = candidate_;
   probability_ = 1.0 / (1.0 + std::exp(0.5 * (even_odds - most)));
+}
+
+/// What an input is off by shows in where the vehicle is.
+void OffsetWatch::begin_inputs(const WalkingFilter& filter, double excess) noexcept {
+  bool is_place_strange = false;
+  for (int j = 0; j < filter.model().output_count(); ++j) {
+    const bool sees_place = filter.depends_on(j, position_x_) || filter.depends_on(j, position_y_);
+    is_place_strange = is_place_strange || (sees_place && is_strange(filter.use(j)));
+  }
+  for (int k = 0; k < std::ssize(inputs_); ++k)
+    if (inputs_[k] >= 0 && (is_place_strange || !has_young(k))) begin({.watched = k, .excess = excess});
+}
+
+/// After a sample.
+void OffsetWatch::age(const WalkingFilter& filter, bool counts) noexcept {
+  suspect_ = refuted_ = candidate_ = -1;
+  for (std::size_t k = 0; k < known_.size(); ++k) {
+    Known& known = known_[k];
+    known.age += counts;
+    if (!known.is_off) continue;
+    if (!is_significant(k)) refuted_ = static_cast<int>(k);
+    if (rivals_[k] < 0) continue;
+    known.by_x = filter.derivative(outputs_[k], position_x_);
+    known.by_y = filter.derivative(outputs_[k], position_y_);
+  }
+  for (Onset& each : onsets_)
+    if (each.watched >= 0) each.age += counts;
+}
+
+/// The constant that innovations speak for most, and its b^^2 by its variance.
+double OffsetWatch::find_candidate(const WalkingFilter& filter, double excess) noexcept {
+  double most = improbable;
+  for (std::size_t m = 0; m < onsets_.size(); ++m) {
+    const Onset& each = onsets_[m];
+    if (each.watched < 0) continue;
+    // What an offset does is in the excess, too, but not before it began.
+    const double alone = m < outputs_.size() ? excess : std::min(excess, each.excess), usual = alone * each.correlation;
+    const int lane = static_cast<int>(m);
+    // None is more significant than what it explains.
+    if (!(score_[lane] * score_[lane] > (most - each.left_out) * alone * information_[lane])) continue;
+    const Constant found = constant(lane);
+    const bool is_end = ends(each.watched, found);
+    double significance = found.significance() / (is_end ? alone : usual);
+    // Slip that has jumped does not just take back what an output was off by.
+    if (is_end) significance += each.left_out;
+    if (!(significance > most) || !is_possible(each.watched, found.value()) || !leaves_possible(lane, filter)) continue;
+    most = significance;
+    candidate_ = lane;
+  }
+  return most;
 }
 
 /// Whether a change takes back what an output was off by: of all changes the most probable one beforehand.

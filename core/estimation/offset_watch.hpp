@@ -173,6 +173,9 @@ class OffsetWatch {
   void set(int lane, const Constant& constant) noexcept;
   void begin(const Onset& onset) noexcept;
   bool has_young(int watched) const noexcept;
+  void begin_inputs(const WalkingFilter& filter, double excess) noexcept;
+  void age(const WalkingFilter& filter, bool counts) noexcept;
+  double find_candidate(const WalkingFilter& filter, double excess) noexcept;
   void note(const WalkingFilter& filter, int output, const KalmanFilter::Use& use, double correlation) noexcept;
   void mark(int lane, int watched) noexcept;
   void adopt_lane(int lane, WalkingFilter& filter) noexcept;

@@ -72,27 +72,34 @@ int bias_of(const WalkingFilter& filter, int output) {
   return -1;
 }
 
-/// The measured inputs of which offsets show: speeds, of which no slip takes a share. What takes such a share is what
-/// an offset would be; and what works by a rate, as of steering, does what a drifting sensor seems to do.
-std::vector<int> watched_inputs(const Model& model) {
+/// The measured inputs of which offsets show: speeds, in whose direction no slip leads. What slip makes of an input is
+/// what its offset would be; and what works by a rate, as of steering, does what a drifting sensor seems to do.
+std::vector<int> watched_inputs(const Model& model, const KalmanFilter::Noise& noise) {
   const ModelDescription& about = model.description();
   const int nx = model.state_count(), nu = model.input_count(), np = model.parameter_count(),
             measured = nu - static_cast<int>(about.noisy_states.size());
   std::vector<int> watched;
   if (about.roles.position_x < 0 || about.roles.position_y < 0) return watched;
-  Eigen::MatrixXd now = jacobian_in_motion(model, short_time), later = jacobian_in_motion(model, 2.0 * short_time);
-  const auto displacement_by = [&](const Eigen::MatrixXd& jacobian, int input) {
+  const Eigen::MatrixXd first = jacobian_in_motion(model, short_time),
+                        later = jacobian_in_motion(model, 2.0 * short_time);
+  const auto way_by = [&](const Eigen::MatrixXd& jacobian, int input) {
     return std::hypot(jacobian(about.roles.position_x, nx + input), jacobian(about.roles.position_y, nx + input));
   };
-  for (int i = 0; i < nx; ++i) now.row(i) /= about.states[static_cast<std::size_t>(i)].scale;
-  const auto by_slip = now.rightCols(np);
+  Eigen::VectorXd scales(nx);
+  for (int i = 0; i < nx; ++i) scales[i] = about.states[static_cast<std::size_t>(i)].scale;
+  Eigen::MatrixXd by_slip = Eigen::MatrixXd::Zero(nx, np);
+  for (int j = 0; j < np; ++j) {
+    const auto parameter = static_cast<std::size_t>(j);
+    if (noise.parameter_lower[parameter] < noise.parameter_upper[parameter])
+      by_slip.col(j) = first.col(nx + nu + j).cwiseQuotient(scales);
+  }
   for (int j = 0; j < measured; ++j) {
-    const auto by_input = now.col(nx + j);
     // Where a speed leads grows with the time, where a rate of something else leads with its square.
-    const double way = displacement_by(jacobian_in_motion(model, short_time), j);
-    if (!(way > 0.0) || displacement_by(later, j) > 3.0 * way) continue;
-    const Eigen::VectorXd rest =
-        np > 0 ? Eigen::VectorXd(by_input - by_slip * by_slip.colPivHouseholderQr().solve(by_input)) : by_input;
+    const double way = way_by(first, j);
+    if (!(way > 0.0) || way_by(later, j) > 3.0 * way) continue;
+    const Eigen::VectorXd by_input = first.col(nx + j).cwiseQuotient(scales);
+    Eigen::VectorXd rest = by_input;
+    if (np > 0) rest -= by_slip * by_slip.colPivHouseholderQr().solve(by_input);
     if (rest.norm() > explained_by_slip * by_input.norm()) watched.push_back(j);
   }
   return watched;
@@ -196,7 +203,7 @@ SensorJudge::SensorJudge(std::shared_ptr<const Model> model, const Setup& setup)
   std::vector<OffsetWatch::Watched> watched;
   if (setup_.offsets) {
     watched = watched_outputs(own_->filter, setup_.noise.output_variances);
-    for (const int input : watched_inputs(own_->filter.model())) watched.push_back({.input = input});
+    for (const int input : watched_inputs(own_->filter.model(), setup_.noise)) watched.push_back({.input = input});
   }
   memory_->offsets = std::make_unique<OffsetWatch>(*model, watched, setup_.noise, offset_gate);
   if (model->description().roles.heading >= 0)

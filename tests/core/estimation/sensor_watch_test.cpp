@@ -125,5 +125,51 @@ TEST(SensorWatch, JudgesFromTheFirstEstimateOn) {
   EXPECT_FALSE(watch.is_active());
 }
 
+/// Of a speed slip takes a share; where that share is known, and stays as it is, the speed itself may be off.
+TEST(SensorWatch, TakesOutWhatASpeedIsOffByWhoseSlipIsKnown) {
+  const auto model = host().make_model("bicycle_slip");
+  for (const double most_kappa : {0.75, 1.0}) {
+    SensorWatch::Setup setup{.noise = {.output_variances = {9e-4, 9e-4, 3e-4},
+                                       .input_variances = {0.01, 0.01},
+                                       .parameter_lower = {0.75, 0.0},
+                                       .parameter_upper = {most_kappa, 1.0}},
+                             .walk = {0.0, 0.03},
+                             .parameter_sigmas = {1e-3, 0.3}};
+    SensorWatch watch(model, setup);
+    Eigen::VectorXd mean = Eigen::VectorXd::Zero(6);
+    mean.tail(2) << 0.75, 0.8;
+    Eigen::MatrixXd covariance = 1e-3 * Eigen::MatrixXd::Identity(6, 6);
+    covariance(4, 4) = 1e-6;
+    watch.restart(mean, covariance);
+    std::mt19937_64 random(5);
+    std::normal_distribution<double> normal;
+    std::vector<double> state(4, 0.0), next(4), outputs(3);
+    const double parameters[] = {0.75, 0.8}, off = 0.5, duration = 0.2;
+    double corrected = 0.0;
+    for (int k = 1; k <= 150; ++k) {
+      const double inputs[] = {3.0, 0.2 * std::cos(0.1 * k)};
+      model->integrate({.count = 1,
+                        .states = state.data(),
+                        .inputs = inputs,
+                        .parameters = parameters,
+                        .durations = &duration,
+                        .next_states = next.data()});
+      state = next;
+      double measured[] = {inputs[0] + off, inputs[1]};
+      watch.clean_inputs(measured);
+      corrected = inputs[0] + off - measured[0];
+      watch.advance(duration, measured);
+      model->observe({.count = 1, .states = state.data(), .outputs = outputs.data()});
+      for (std::size_t j = 0; j < outputs.size(); ++j)
+        outputs[j] += std::sqrt(setup.noise.output_variances[j]) * normal(random);
+      watch.judge(0.2 * k, outputs.data());
+    }
+    if (most_kappa > 0.75)
+      EXPECT_EQ(corrected, 0.0);
+    else
+      EXPECT_NEAR(corrected, off, 0.1);
+  }
+}
+
 }  // namespace sensor_watch_test
 }  // namespace rhec
