@@ -292,7 +292,7 @@ class Tractor:
                 "hitch": lambda: numpy.array([self.psi - self.psi_trailer])}[sensor]()
 
 
-class Slope:
+class Slope(Bicycle):
     """A farm vehicle across a slope, which pushes its axles aside; a receiver with two antennas, an encoder, a radar and a gyro."""
     step, heading, inputs_every, inputs_late = 0.1, 2, 5, 0.01
     sensors = (Sensor("gps", "position", ("x_gps", "y_gps"), 10, 7, 0.08, 0.02, 0.012, 0.010, 0.9),
@@ -335,9 +335,6 @@ class Slope:
         self.delta += TICK * turning
         self.time += TICK
         self.inputs = numpy.array([wheels, turning])
-
-    def truth(self):
-        return numpy.array([self.x, self.y]), self.psi
 
     def read(self, sensor):
         return {"gps": lambda: antenna(self.x, self.y, self.psi, self.ahead, self.left), "antennas": lambda: numpy.array([self.psi]),
