@@ -63,7 +63,7 @@ std::string in_words(const Health& health, const std::vector<Sensor>& sensors, c
   }
   const bool is_named = health.off_input >= 0 && health.off_input < std::ssize(inputs);
   add("inputs", is_named ? health.inputs.reasons & ~reason::off : health.inputs.reasons,
-      health.inputs.offset == 0.0 ? "was off" : "off");
+      health.inputs.offset == 0.0 ? "were off" : "off");
   if (is_named) {
     const Sensor& input = inputs[static_cast<std::size_t>(health.off_input)];
     add("input " + input.name, health.inputs.reasons & reason::off,

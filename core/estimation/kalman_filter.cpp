@@ -387,7 +387,7 @@ void KalmanFilter::carry(Deviations& deviations) noexcept {
         if (by != 0.0) sum += by * Eigen::Map<const Lanes>(rows + c * stride);
       }
       for (Eigen::Index j = 0; j < deviations.by_input.rows(); ++j)
-        if (const double by = jacobian_[(nx_ + j) * nx_ + r]; by != 0.0)
+        if (const double by = is_missing_[j] ? 0.0 : jacobian_[(nx_ + j) * nx_ + r]; by != 0.0)
           sum += by * Eigen::Map<const Lanes>(deviations.by_input.data() + j * stride + first);
       Eigen::Map<Lanes>(carried_.data() + r * count()) = sum;
     }

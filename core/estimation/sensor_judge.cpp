@@ -3,6 +3,8 @@
 #include <limits>
 #include <utility>
 
+#include <Eigen/QR>
+
 #include <fmt/format.h>
 
 #include "innovation.hpp"

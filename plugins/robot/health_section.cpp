@@ -13,9 +13,10 @@ const OptionTable<HealthOptions>& HealthOptions::table() {
       OptionTable<H>()
           .flag("watch", &H::watch,
                 "whether stamps, inputs and measurements are judged before they are used; false: all are trusted")
-          .flag("offsets", &H::offsets,
-                "whether angles, speeds and the like that are off by little for long are found, and what they are off by "
-                "taken out of what is measured")
+          .flag(
+              "offsets", &H::offsets,
+              "whether angles, speeds and the like that are off by little for long are found, and what they are off by "
+              "taken out of what is measured")
           .flag("whiteness", &H::whiteness,
                 "whether the covariance that is given out is larger where innovations are correlated, as by errors "
                 "that last and what a model does not have")

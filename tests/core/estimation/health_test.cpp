@@ -34,7 +34,7 @@ TEST(Health, InWords) {
   EXPECT_EQ(in_words(health, sensors), "degraded: x_gps and y_gps rejected and moved; inputs implausible and off");
   health.inputs.offset = 0.0;
   health.off_input = -1;
-  EXPECT_EQ(in_words(health, sensors), "degraded: x_gps and y_gps rejected and moved; inputs implausible and was off");
+  EXPECT_EQ(in_words(health, sensors), "degraded: x_gps and y_gps rejected and moved; inputs implausible and were off");
   health = {.level = HealthLevel::lost, .reasons = reason::uncertain, .sensors = health.sensors, .inputs = {}};
   EXPECT_EQ(in_words(health, sensors), "lost: uncertain; x_gps and y_gps rejected and moved");
 }

@@ -125,6 +125,21 @@ TEST(KalmanFilter, CarriesDeviationsAsItMovesTheMean) {
     EXPECT_LT((filter.mean + moved.columns.col(m) - ends[static_cast<std::size_t>(m)]).norm(), 1e-12) << m;
 }
 
+TEST(KalmanFilter, AnInputThatIsMissingIsNotOff) {
+  const auto model = linear_model<Hovercraft>();
+  const double nan = std::numeric_limits<double>::quiet_NaN(), inputs[] = {0.3, nan};
+  KalmanFilter filter = filter_for(model), other = filter_for(model);
+  const Eigen::Index n = filter.mean.size();
+  KalmanFilter::Deviations moved{
+      .columns = Eigen::MatrixXd::Zero(n, 1), .by_input = Eigen::MatrixXd::Constant(2, 1, 0.1), .used = 1};
+  filter.predict(inputs, nullptr, 0.2);
+  filter.carry(moved);
+  const double off[] = {inputs[0] + 0.1, nan};
+  other.predict(off, nullptr, 0.2);
+  EXPECT_GT(moved.columns.norm(), 1e-3);
+  EXPECT_LT((filter.mean + moved.columns.col(0) - other.mean).norm(), 1e-12);
+}
+
 TEST(KalmanFilter, RestartsAParameterAsIfNothingWereKnownOfIt) {
   const auto model = linear_model<Boat>();
   KalmanFilter filter = filter_for(model);

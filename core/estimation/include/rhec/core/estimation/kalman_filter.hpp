@@ -94,7 +94,7 @@ class RHEC_EXPORT KalmanFilter {
   struct Deviations {
     using Columns = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
     Columns columns;
-    Columns by_input = {};  ///< (n_u): what an input is off by in each, besides; empty: nothing
+    Columns by_input = {};  ///< (n_u): what a measured input is off by, besides; empty: nothing
     Eigen::Index used = 0;
   };
   /// Moves them on as the last prediction by a duration has moved the mean.
