@@ -342,9 +342,11 @@ void OffsetWatch::take(const WalkingFilter& filter, double excess,
 
 /// What an input is off by shows in where the vehicle is.
 void OffsetWatch::begin_inputs(const WalkingFilter& filter, double excess) noexcept {
+  if (sensitivities_.by_input.size() == 0) return;
+  const auto sees = [&](int output, int state) { return state >= 0 && filter.depends_on(output, state); };
   bool is_place_strange = false;
   for (int j = 0; j < filter.model().output_count(); ++j) {
-    const bool sees_place = filter.depends_on(j, position_x_) || filter.depends_on(j, position_y_);
+    const bool sees_place = sees(j, position_x_) || sees(j, position_y_);
     is_place_strange = is_place_strange || (sees_place && is_strange(filter.use(j)));
   }
   for (int k = 0; k < std::ssize(inputs_); ++k)
