@@ -3,12 +3,11 @@
 #include <limits>
 #include <utility>
 
-#include <Eigen/QR>
-
 #include <fmt/format.h>
 
 #include "innovation.hpp"
 #include "rhec/core/base/error.hpp"
+#include "rhec/core/estimation/input_factors.hpp"
 #include "sensor_judge_parts.hpp"
 
 namespace rhec {
@@ -29,8 +28,6 @@ constexpr double impossibly_beyond = 4.0, usually_beyond = 0.75, at_its_bound = 
 
 // Over which it is looked at what moves what [s].
 constexpr double short_time = 0.1;
-// The share of what an input does that slip need not explain.
-constexpr double explained_by_slip = 0.2;
 
 /// Derivatives of the state after a time [s] by [x; u; p], at a point where everything moves: of a vehicle that stands
 /// much else stays as it is.
@@ -74,35 +71,30 @@ int bias_of(const WalkingFilter& filter, int output) {
   return -1;
 }
 
-/// The measured inputs of which offsets show: speeds, in whose direction no slip leads. What slip makes of an input is
-/// what its offset would be; and what works by a rate, as of steering, does what a drifting sensor seems to do.
+/// The measured inputs of which offsets show: speeds, of which no slip is a factor that is not known. What slip makes
+/// of an input is what its offset would be; and what works by a rate, as of steering, does what a drifting sensor seems
+/// to do.
 std::vector<int> watched_inputs(const Model& model, const KalmanFilter::Noise& noise) {
   const ModelDescription& about = model.description();
-  const int nx = model.state_count(), nu = model.input_count(), np = model.parameter_count(),
-            measured = nu - static_cast<int>(about.noisy_states.size());
+  const int nx = model.state_count(), measured = model.input_count() - static_cast<int>(about.noisy_states.size());
   std::vector<int> watched;
   if (about.roles.position_x < 0 || about.roles.position_y < 0) return watched;
+  const InputFactors factors(model);
   const Eigen::MatrixXd first = jacobian_in_motion(model, short_time),
                         later = jacobian_in_motion(model, 2.0 * short_time);
   const auto way_by = [&](const Eigen::MatrixXd& jacobian, int input) {
     return std::hypot(jacobian(about.roles.position_x, nx + input), jacobian(about.roles.position_y, nx + input));
   };
-  Eigen::VectorXd scales(nx);
-  for (int i = 0; i < nx; ++i) scales[i] = about.states[static_cast<std::size_t>(i)].scale;
-  Eigen::MatrixXd by_slip = Eigen::MatrixXd::Zero(nx, np);
-  for (int j = 0; j < np; ++j) {
-    const auto parameter = static_cast<std::size_t>(j);
-    if (noise.parameter_lower[parameter] < noise.parameter_upper[parameter])
-      by_slip.col(j) = first.col(nx + nu + j).cwiseQuotient(scales);
-  }
   for (int j = 0; j < measured; ++j) {
     // Where a speed leads grows with the time, where a rate of something else leads with its square.
     const double way = way_by(first, j);
-    if (!(way > 0.0) || way_by(later, j) > 3.0 * way) continue;
-    const Eigen::VectorXd by_input = first.col(nx + j).cwiseQuotient(scales);
-    Eigen::VectorXd rest = by_input;
-    if (np > 0) rest -= by_slip * by_slip.colPivHouseholderQr().solve(by_input);
-    if (rest.norm() > explained_by_slip * by_input.norm()) watched.push_back(j);
+    bool is_told = way > 0.0 && way_by(later, j) <= 3.0 * way;
+    for (int p = 0; p < model.parameter_count(); ++p) {
+      const auto parameter = static_cast<std::size_t>(p);
+      const bool is_open = noise.parameter_lower[parameter] < noise.parameter_upper[parameter];
+      is_told = is_told && !(is_open && factors.is_factor(p, j));
+    }
+    if (is_told) watched.push_back(j);
   }
   return watched;
 }

@@ -33,6 +33,12 @@ TEST(InputFactors, AreWhatNothingTellsFromAnInput) {
   const auto& slip = robot->description().parameters;
   EXPECT_EQ(held(*robot, 0), Names{slip[0].name});
   EXPECT_EQ(held(*robot, 1), Names{slip[1].name});
+  EXPECT_EQ(held(*host().make_model("unicycle_traction"), 0), Names{"mu"});
+  EXPECT_EQ(held(*host().make_model("tractor_trailer"), 0), Names{"mu"});
+  EXPECT_EQ(held(*host().make_model("bicycle_sideslip"), 0), Names{});
+  EXPECT_TRUE(InputFactors(*bicycle).is_factor(0, 0));
+  EXPECT_FALSE(InputFactors(*bicycle).is_factor(1, 0));
+  EXPECT_FALSE(InputFactors(*bicycle).is_factor(0, 1));
   const auto hovercraft = linear_model<Hovercraft>();
   EXPECT_EQ(held(*hovercraft, 0), Names{});
   EXPECT_EQ(held(*hovercraft, 1), Names{});

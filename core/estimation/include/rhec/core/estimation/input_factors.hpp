@@ -17,6 +17,9 @@ class RHEC_EXPORT InputFactors {
  public:
   explicit InputFactors(const Model& model);
 
+  bool is_factor(int parameter, int input) const noexcept {
+    return is_factor_[static_cast<std::size_t>(parameter) * inputs_ + static_cast<std::size_t>(input)] != 0;
+  }
   /// Of an interval with inputs as measured (n_u, NaN where missing).
   void begin(const double* measured) noexcept;
   bool is_held(int parameter) const noexcept { return is_held_[static_cast<std::size_t>(parameter)] != 0; }
