@@ -264,7 +264,7 @@ void SensorJudge::reset() noexcept {
   memory_->stuck.reset();
   memory_->beyond_bounds = 0.0;
   memory_->impossible_samples = 0;
-  memory_->was_open = memory_->is_starting = false;
+  memory_->was_open = memory_->was_input_off = memory_->is_starting = false;
   memory_->places.clear();
   memory_->undisputed_samples = setup_.calm;
   std::fill(believed_input_.begin(), believed_input_.end(), 0.0);
@@ -544,7 +544,12 @@ SensorJudge::Finding SensorJudge::judge(double time, double* outputs, const doub
   if (!is_active_) finding = place_start(outputs, weights);
   note_offsets();
   if (is_blind_) input_findings_ |= reason::rejected;
-  bool is_calm = input_findings_ == 0;
+  // A measured input that is off, as by slip that a model does not have, is known from then on: it is said, and all
+  // else agrees without that. Until it was found it did not, nor does it where it is off no longer.
+  const bool is_input_off = (input_findings_ & reason::off) != 0;
+  const bool is_known = is_input_off == memory_->was_input_off;
+  memory_->was_input_off = is_input_off;
+  bool is_calm = is_known && (input_findings_ & ~reason::off) == 0;
   const bool is_open = is_probably_slip();
   memory_->was_open = is_open;
   memory_->undisputed_samples = is_disputed_ ? 0 : std::min(memory_->undisputed_samples + counted, setup_.calm);
@@ -555,8 +560,8 @@ SensorJudge::Finding SensorJudge::judge(double time, double* outputs, const doub
     if (findings_[s]) states_[s].reasons = findings_[s] | (states_[s].reasons & reason::moved);
   }
   calm_samples_ = is_calm ? calm_samples_ + counted : 0;
-  if (input_findings_) inputs_.reasons = input_findings_;
-  if (calm_samples_ >= setup_.calm) inputs_.reasons = 0;
+  if ((input_findings_ & ~reason::off) != 0 || (is_input_off && !is_known)) inputs_.reasons = input_findings_;
+  if (calm_samples_ >= setup_.calm) inputs_.reasons = input_findings_ & reason::off;
   input_findings_ = 0;
   forget_reasons();
   return finding;

@@ -117,6 +117,7 @@ struct SensorJudge::Memory {
   double duration = 0.0;
   bool has_advanced = false;   ///< since the last samples
   bool was_calm = true;        ///< health was ok when the dispute began, and there had been none for some time
+  bool was_input_off = false;  ///< a measured input was, at the last sample
   bool was_open = false;       ///< what was disputed at the last sample was probably slip, and nothing was said of it
   int undisputed_samples = 0;  ///< in a row
   bool is_counted = true;      ///< the last sample has a position, or was to have one; true where there are none

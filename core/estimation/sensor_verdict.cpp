@@ -180,7 +180,7 @@ void SensorJudge::assess(const Estimate& estimate, std::span<const Presence> pre
   health.off_input = off_input_;
   health.covariance_factor = covariance_factor();
   if (inputs == Presence::silent) health.inputs.reasons |= reason::silent;
-  bool has_finding = reasons != 0 || calm_samples_ < setup_.calm || health.inputs.reasons != 0;
+  bool has_finding = reasons != 0 || calm_samples_ < setup_.calm || (health.inputs.reasons & ~reason::off) != 0;
   bool is_overdue = inputs != Presence::present;
   for (std::size_t s = 0; s < sensors_.size(); ++s) {
     if (presence[s] == Presence::silent) health.sensors[s].reasons |= reason::silent;

@@ -21,10 +21,11 @@ class StuckValues {
   /// A measured value (NaN: none), and what was expected before it was used.
   void take(std::size_t output, double value, double expected) noexcept {
     Output& each = outputs_[output];
+    // What the vehicle's motion has added since the last sample, by its own: angles change by little in a sample. It
+    // does so in samples that have values of other sensors alone, too.
+    if (!std::isnan(each.corrected)) each.movement += expected - each.corrected;
     if (std::isnan(value)) return;
     ++each.values;
-    // What the vehicle's motion has added since the last sample, by its own: angles change by little in a sample.
-    each.movement += expected - each.corrected;
     if (value != each.last) {
       each.last = value;
       each.repeats = 0;
@@ -49,7 +50,7 @@ class StuckValues {
   struct Output {
     double sigma = 0.0;
     double last = std::numeric_limits<double>::quiet_NaN();
-    double corrected = 0.0, movement = 0.0;
+    double corrected = std::numeric_limits<double>::quiet_NaN(), movement = 0.0;
     int repeats = 0;
     long values = 0, all_repeats = 0;
   };

@@ -341,4 +341,124 @@ class Slope(Bicycle):
                 "steering": lambda: numpy.array([self.delta]), "radar": lambda: numpy.array([self.v]), "gyro": lambda: numpy.array([self.yaw_rate])}[sensor]()
 
 
-VEHICLES = {"bicycle": Bicycle, "rover": Rover, "two_receivers": TwoReceivers, "skid_steer": SkidSteer, "tracks": Tracks, "tractor": Tractor, "slope": Slope}
+class Shuttle(Bicycle):
+    """A yard tug that drives to and fro, and stands in between; its receiver says something then, too."""
+    # Speeds as parts of the usual one, and how long they are asked for [s].
+    course = ((1.0, 14.0), (0.0, 5.0), (-0.6, 9.0), (0.0, 1.0), (0.5, 6.0), (0.0, 8.0))
+
+    def __init__(self, noise, speed):
+        super().__init__(noise, speed)
+        self.wheels, self.began = 0.0, noise.uniform(0.0, 20.0)
+
+    def wanted(self):
+        left = (self.began + self.time) % sum(length for _, length in self.course)
+        for part, length in self.course:
+            if left < length:
+                return part * self.speed
+            left -= length
+        return 0.0
+
+    def advance(self):
+        kappa, mu, angle = self.kappa.step(), self.mu.step(), self.sideways.step()
+        self.wheels += min(max(self.wanted() - self.wheels, -1.5 * TICK), 1.5 * TICK)
+        wanted = 0.35 * math.sin(self.pace * self.time + self.phase)
+        turning = min(max(3.0 * (wanted - self.delta), -0.6), 0.6) if self.wheels != 0.0 else 0.0
+        self.v += (kappa * (1.0 - self.spin) * self.wheels - self.v) * TICK / 0.1
+        self.yaw_rate = self.v / self.wheelbase * math.tan(mu * self.delta)
+        self.x += TICK * self.v * math.cos(self.psi + angle)
+        self.y += TICK * self.v * math.sin(self.psi + angle)
+        self.psi += TICK * self.yaw_rate
+        self.delta += TICK * turning
+        self.time += TICK
+        self.inputs = numpy.array([self.wheels, turning])
+
+
+class Misbuilt(Rover):
+    """A rover with a receiver at 5 Hz whose measures are wrong, whose compass is mounted crooked, and whose speed is old."""
+    step, inputs_every, inputs_late = 0.1, 5, 0.06
+    sensors = (Sensor("gps", "position", ("x_gps", "y_gps"), 20, 11, 0.20, 0.05, 0.03, 0.02, 0.9),
+               Sensor("steering", "angle", ("delta",), 5, 2, 0.01, 0.0, 0.012, quantum=0.004, zero=0.02),
+               Sensor("compass", "angle", ("heading",), 10, 4, 0.02, 0.0, 0.02, 0.02, 0.95, zero=0.05),
+               Sensor("gyro", "rate", ("yaw_rate",), 2, 0, 0.005, 0.0, 0.008, zero=0.02, walk=0.001))
+    built, mounted, age = 1.55, 0.6, 15  # wheelbase and antenna as they are [m]; the speed's [ticks]
+
+    def __init__(self, noise, speed):
+        super().__init__(noise, speed)
+        self.speeds = []
+
+    @classmethod
+    def configuration(cls, estimator):
+        configuration = super().configuration(estimator)
+        configuration["noise"]["outputs"] |= {"x_gps": 0.05, "y_gps": 0.05}
+        return configuration
+
+    def advance(self):
+        stated, self.wheelbase = self.wheelbase, self.built
+        super().advance()
+        self.wheelbase = stated
+        self.speeds.append(self.inputs[0])
+        self.inputs = numpy.array([self.speeds[max(0, len(self.speeds) - 1 - self.age)], self.inputs[1]])
+
+    def read(self, sensor):
+        return antenna(self.x, self.y, self.psi, -self.mounted) if sensor == "gps" else super().read(sensor)
+
+
+class Mecanum:
+    """A platform with rollers that goes any way, as somebody writes it down; a receiver, a compass and a gyro."""
+    step, heading, inputs_every, inputs_late = 0.1, 2, 2, 0.01
+    sensors = (Sensor("gps", "position", ("x_gps", "y_gps"), 20, 7, 0.09, 0.02, 0.02, 0.015),
+               Sensor("compass", "angle", ("heading",), 10, 4, 0.02, 0.0, 0.02, 0.02, 0.95, zero=0.01),
+               Sensor("gyro", "rate", ("yaw_rate",), 2, 0, 0.005, 0.0, 0.006, zero=0.01, walk=0.0005))
+    ahead, left = 0.25, 0.15
+
+    def __init__(self, noise, speed):
+        self.noise, self.speed, self.time = noise, 0.3 * speed, 0.0
+        self.x = self.y = self.psi = self.forward = self.aside = self.turn = 0.0
+        self.slips = Slip(noise, 0.8, 0.99), Slip(noise, 0.55, 0.9), Slip(noise, 0.75, 0.98)
+        self.pace, self.phase = noise.uniform(0.1, 0.4), noise.uniform(0.0, 6.0)
+        self.spin, self.inputs = 0.0, numpy.zeros(3)
+
+    @classmethod
+    def configuration(cls, estimator):
+        slip = {"typical": 0.3, "bounds": [0, 1.1], "nominal": 0.9}
+        equations = {
+            "options": {"ahead": {"default": 0.0, "unit": "m"}, "left": {"default": 0.0, "unit": "m"}},
+            "states": {"x": {"unit": "m", "typical": 5, "role": "position_x"}, "y": {"unit": "m", "typical": 5, "role": "position_y"},
+                       "psi": {"unit": "rad", "angle": True, "role": "heading"}},
+            "inputs": {"forward": {"unit": "m/s", "typical": 1}, "aside": {"unit": "m/s", "typical": 1}, "turn": {"unit": "rad/s", "typical": 1}},
+            "parameters": {"along": slip, "across": slip, "round": slip},
+            "outputs": {"x_gps": {"unit": "m", "typical": 5}, "y_gps": {"unit": "m", "typical": 5}, "heading": {"unit": "rad", "angle": True},
+                        "yaw_rate": {"unit": "rad/s", "typical": 1}},
+            "equations": "\n".join([
+                "x' = along * forward * cos(psi) - across * aside * sin(psi)", "y' = along * forward * sin(psi) + across * aside * cos(psi)",
+                "psi' = round * turn", "x_gps = x + ahead * cos(psi) - left * sin(psi)", "y_gps = y + ahead * sin(psi) + left * cos(psi)",
+                "heading = psi", "yaw_rate = round * turn"])}
+        return {"step": cls.step, "model": {"equations": equations, "ahead": cls.ahead, "left": cls.left},
+                "noise": {"outputs": {"x_gps": 0.03, "y_gps": 0.03, "heading": 0.04, "yaw_rate": 0.01},
+                          "inputs": {"forward": 0.05, "aside": 0.05, "turn": 0.05},
+                          "biases": {"yaw_rate": {"sigma": 0.02, "drift": 0.001}, "heading": {"sigma": 0.02, "drift": 0.002}}},
+                "estimator": {"name": estimator, "horizon": "3 s", "initial": {"sigma": {"psi": 0.3}}}}
+
+    def advance(self):
+        wanted = numpy.array([self.speed * math.cos(self.pace * self.time), self.speed * math.sin(1.7 * self.pace * self.time + self.phase),
+                              0.4 * math.sin(0.6 * self.pace * self.time)])
+        along, across, turned = ((1.0 - self.spin) * slip.step() * part for slip, part in zip(self.slips, wanted))
+        self.forward += (along - self.forward) * TICK / 0.08
+        self.aside += (across - self.aside) * TICK / 0.08
+        self.turn += (turned - self.turn) * TICK / 0.08
+        self.x += TICK * (self.forward * math.cos(self.psi) - self.aside * math.sin(self.psi))
+        self.y += TICK * (self.forward * math.sin(self.psi) + self.aside * math.cos(self.psi))
+        self.psi += TICK * self.turn
+        self.time += TICK
+        self.inputs = wanted
+
+    def truth(self):
+        return numpy.array([self.x, self.y]), self.psi
+
+    def read(self, sensor):
+        return {"gps": lambda: antenna(self.x, self.y, self.psi, self.ahead, self.left), "compass": lambda: numpy.array([self.psi]),
+                "gyro": lambda: numpy.array([self.turn])}[sensor]()
+
+
+VEHICLES = {"bicycle": Bicycle, "rover": Rover, "two_receivers": TwoReceivers, "skid_steer": SkidSteer, "tracks": Tracks, "tractor": Tractor, "slope": Slope,
+            "shuttle": Shuttle, "misbuilt": Misbuilt, "mecanum": Mecanum}

@@ -1,6 +1,7 @@
 // An estimator whose sensors, stamps and inputs fail: what it makes of each fault, and whether it says so.
 #include "rhec/core/estimation/sensor_watch.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <chrono>
@@ -146,6 +147,9 @@ TEST(SensorWatch, TakesOutWhatASpeedIsOffByWhoseSlipIsKnown) {
     std::vector<double> state(4, 0.0), next(4), outputs(3);
     const double parameters[] = {0.75, 0.8}, off = 0.5, duration = 0.2;
     double corrected = 0.0;
+    Estimate estimate;
+    Health health;
+    HealthLevel when_found = HealthLevel::ok;
     for (int k = 1; k <= 150; ++k) {
       const double inputs[] = {3.0, 0.2 * std::cos(0.1 * k)};
       model->integrate({.count = 1,
@@ -163,11 +167,21 @@ TEST(SensorWatch, TakesOutWhatASpeedIsOffByWhoseSlipIsKnown) {
       for (std::size_t j = 0; j < outputs.size(); ++j)
         outputs[j] += std::sqrt(setup.noise.output_variances[j]) * normal(random);
       watch.judge(0.2 * k, outputs.data());
+      const bool was_off = health.off_input >= 0;
+      estimate.covariance = watch.covariance();
+      watch.assess(estimate, std::vector(2, SensorWatch::Presence::present), SensorWatch::Presence::present, 0, health);
+      if (health.off_input == 0 && !was_off) when_found = health.level;
     }
-    if (most_kappa > 0.75)
+    EXPECT_EQ(health.level, HealthLevel::ok);
+    if (most_kappa > 0.75) {
       EXPECT_EQ(corrected, 0.0);
-    else
+      EXPECT_EQ(health.inputs.reasons, 0u);
+    } else {
       EXPECT_NEAR(corrected, off, 0.1);
+      EXPECT_EQ(when_found, HealthLevel::degraded);  // until then something else was said of it
+      EXPECT_EQ(health.inputs.reasons, reason::off);
+      EXPECT_THAT(watch.in_words(health), ::testing::StartsWith("ok: input u1 off by about 0."));
+    }
   }
 }
 

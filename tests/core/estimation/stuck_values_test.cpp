@@ -51,5 +51,19 @@ TEST_F(OneOutput, WhatIsMissingIsNoRepetition) {
   EXPECT_FALSE(values.is_stuck(0));
 }
 
+TEST_F(OneOutput, TheVehicleMovesInSamplesOfOtherSensorsToo) {
+  const double none = std::nan("");
+  for (int k = 0; k < 30; ++k) {
+    measure(expected + noise(random), 0.001);
+    for (int i = 0; i < 9; ++i) measure(none, 0.02);
+  }
+  for (int k = 0; k < 3; ++k) {
+    EXPECT_FALSE(values.is_stuck(0)) << k;
+    for (int i = 0; i < 9; ++i) measure(none, 0.02);
+    measure(6.0, 0.001);
+  }
+  EXPECT_TRUE(values.is_stuck(0));
+}
+
 }  // namespace stuck_values_test
 }  // namespace rhec
