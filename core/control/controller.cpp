@@ -124,11 +124,12 @@ Controller::Controller(std::shared_ptr<const Model> model, std::shared_ptr<Solve
       relaxed_plan_(problem_.capacity()) {
   if (const std::string& reason = path_.why_not_drivable(); !reason.empty()) throw Error(reason);
   const Setup::Pace& pace = setup_.pace;
-  if (!(pace.degraded >= 0.0 && pace.degraded <= 1.0 && pace.lost >= 0.0 && pace.lost <= 1.0 && pace.seconds > 0.0))
+  const auto is_share = [](double each) { return each >= 0.0 && each <= 1.0; };
+  if (!(is_share(pace.degraded) && is_share(pace.lost) && is_share(pace.heading) && pace.seconds > 0.0))
     throw Error(
-        fmt::format("controller: paces {} and {} within {} s; expected shares of the speed from 0 to 1, and a "
+        fmt::format("controller: paces {}, {} and {} within {} s; expected shares of the speed from 0 to 1, and a "
                     "positive time",
-                    pace.degraded, pace.lost, pace.seconds));
+                    pace.degraded, pace.lost, pace.heading, pace.seconds));
   const int N = setup_.problem.max_intervals;
   problem_.set_intervals(N);
   begins_.assign(N, 0);
@@ -312,8 +313,10 @@ void Controller::find_points(double arc_length) noexcept {
 /// The pace moves on by one interval towards what an estimate's health allows.
 void Controller::choose_pace(const Health& health) noexcept {
   const bool is_starting = (health.reasons & reason::starting) != 0;
+  const bool is_heading_sought = (health.reasons & reason::heading) != 0;
   wanted_pace_ = is_starting || health.level == HealthLevel::ok ? 1.0
                  : health.level == HealthLevel::degraded        ? setup_.pace.degraded
+                 : is_heading_sought                            ? std::max(setup_.pace.heading, setup_.pace.lost)
                                                                 : setup_.pace.lost;
   const double change = setup_.interval / setup_.pace.seconds;
   pace_ += std::min(std::max(wanted_pace_ - pace_, -change), change);

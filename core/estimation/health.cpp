@@ -36,6 +36,8 @@ const char* name_of_reason(std::uint32_t reason) noexcept {
       return "starting";
     case reason::off:
       return "off";
+    case reason::heading:
+      return "heading unknown";
     default:
       return "";
   }

@@ -174,6 +174,7 @@ class SensorJudge {
   bool distrust_receiver() noexcept;
 
   // sensor_verdict.cpp
+  bool is_place_measured(std::span<const Presence> presence) const noexcept;
   void note_volume(const Estimate& estimate) noexcept;
 
   Setup setup_;

@@ -172,6 +172,13 @@ void SensorJudge::note_volume(const Estimate& estimate) noexcept {
     usual_volume_ += (volume - usual_volume_) / volume_memory;
 }
 
+/// Whether a position is measured, and not for too long no more.
+bool SensorJudge::is_place_measured(std::span<const Presence> presence) const noexcept {
+  for (std::size_t s = 0; s < sensors_.size(); ++s)
+    if (presence[s] != Presence::silent && sees_position(sensors_[s].outputs)) return true;
+  return false;
+}
+
 void SensorJudge::assess(const Estimate& estimate, std::span<const Presence> presence, Presence inputs,
                          std::uint32_t reasons, Health& health) noexcept {
   health.reasons = reasons;
@@ -190,7 +197,7 @@ void SensorJudge::assess(const Estimate& estimate, std::span<const Presence> pre
   const Roles& roles = own_->filter.model().description().roles;
   const Eigen::MatrixXd& P = estimate.covariance;
   if (is_searching()) health.reasons |= memory_->is_starting ? reason::starting : reason::uncertain;
-  bool is_lost = (reasons & reason::starting) != 0;
+  bool is_lost = (reasons & reason::starting) != 0, is_place_known = false, is_heading_known = false;
   if (P.rows() > 0) {
     // What is no variance says that nothing is known. What correlated innovations add to it is no reason to stop.
     const auto is_known = [&](int i, double limit) {
@@ -198,9 +205,9 @@ void SensorJudge::assess(const Estimate& estimate, std::span<const Presence> pre
       const double added = (health.covariance_factor - 1.0) * std::max(0.0, own_->filter.covariance()(i, i));
       return P(i, i) >= 0.0 && P(i, i) - added <= limit * limit;
     };
-    const bool is_place_known =
+    is_place_known =
         is_known(roles.position_x, setup_.lost_position) && is_known(roles.position_y, setup_.lost_position);
-    const bool is_heading_known = is_known(roles.heading, setup_.lost_heading);
+    is_heading_known = is_known(roles.heading, setup_.lost_heading);
     if (!is_place_known || !is_heading_known) {
       health.reasons |= reason::uncertain;
       is_lost = true;
@@ -217,6 +224,9 @@ void SensorJudge::assess(const Estimate& estimate, std::span<const Presence> pre
     }
   }
   is_lost = is_lost || is_searching() || is_place_lost();
+  const bool is_heading_sought = is_place_known && !is_place_lost() && (is_searching() || !is_heading_known);
+  if (is_heading_sought && (health.reasons & reason::starting) == 0 && is_place_measured(presence))
+    health.reasons |= reason::heading;
   health.level = is_lost ? HealthLevel::lost : has_finding ? HealthLevel::degraded : HealthLevel::ok;
 }
 

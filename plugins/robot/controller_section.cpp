@@ -20,7 +20,9 @@
 namespace rhec {
 namespace {
 
-constexpr double position_weight = 1.0, terminal_weight = 10.0, input_weight = 5.0;
+constexpr double position_weight = 1.0, terminal_weight = 10.0, speed_weight = 5.0;
+// Of an input's typical magnitude: little, for else a vehicle rather leaves its path than steers.
+constexpr double effort_weight = 0.02;
 constexpr PluginOption<Blocking> of_input{.otherwise = "unblocked"};
 constexpr PluginOption<Term> in_list{.otherwise = ""};
 
@@ -30,10 +32,18 @@ bool is_position(const ModelDescription& about, std::size_t state) {
 }
 
 DefaultByName<double> stage_default() {
-  return {fmt::format("{} for the position, {} for a speed, else 0", position_weight, input_weight),
+  return {fmt::format("{} for the position, {} for a speed, else 0", position_weight, speed_weight),
           [](const ModelDescription& about, const Variable&, std::size_t j) {
-            if (static_cast<int>(j) == about.roles.speed_state) return input_weight;
+            if (static_cast<int>(j) == about.roles.speed_state) return speed_weight;
             return is_position(about, j) ? position_weight : 0.0;
+          }};
+}
+
+DefaultByName<double> input_default() {
+  return {fmt::format("{} for a speed, else {} / typical^2", speed_weight, effort_weight),
+          [](const ModelDescription& about, const Variable& input, std::size_t j) {
+            return static_cast<int>(j) == about.roles.speed ? speed_weight
+                                                            : effort_weight / (input.scale * input.scale);
           }};
 }
 
@@ -41,7 +51,7 @@ const NumbersByName& stage_by_name() {
   static const NumbersByName map(
       "weights: stage", {at_least(0.0)},
       {{"STATE", &ModelDescription::states, stage_default(), "of the squared distance from the reference at a node"},
-       {"INPUT", &ModelDescription::inputs, constant_default(input_weight),
+       {"INPUT", &ModelDescription::inputs, input_default(),
         "of the squared distance from the reference on an interval"}});
   return map;
 }
@@ -116,6 +126,10 @@ const OptionTable<PaceOptions>& PaceOptions::table() {
           .number("degraded", &P::degraded, "share of the path's speed while an estimate's health is degraded",
                   between(0.0, 1.0))
           .number("lost", &P::lost, "the same while the vehicle is lost; 0: it stops on the path", between(0.0, 1.0))
+          .number("heading", &P::heading,
+                  "the same while it is known where the vehicle is, but not where it heads, which only motion tells; "
+                  "0: it stands until somebody says it",
+                  between(0.0, 1.0))
           .number("seconds", &P::seconds, "from the full speed to a stop, and back [s]", greater_than(0.0));
   return rows;
 }
@@ -267,7 +281,7 @@ std::unique_ptr<Controller> ControllerSection::make(const Path& path, const Robo
     add_problem(setup, intervals);
     setup.interval = context_->step;
     setup.search.stop_time = context_->step;
-    setup.pace = {options_.health.degraded, options_.health.lost, options_.health.seconds};
+    setup.pace = {options_.health.degraded, options_.health.lost, options_.health.heading, options_.health.seconds};
     setup.reference_speed = options_.reference_speed;
     setup.least_speed_factor = options_.least_speed_factor;
     setup.speed_bound_factor = options_.speed_bound_factor;

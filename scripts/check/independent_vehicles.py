@@ -2,7 +2,7 @@
 
 Wheels, steering and hitches lag, vehicles drift sideways, slip wanders in time and jumps, fixes are coloured, encoders have steps,
 zeros drift, clocks began weeks ago, and each sensor has a rate and a latency. A vehicle says how somebody would configure rhec for
-it: with what data sheets say, not with what is true.
+it: with what data sheets say, not with what is true. It goes by a course of its own, or does what `command` asks of its inputs.
 """
 import dataclasses
 import math
@@ -84,14 +84,14 @@ class Bicycle:
     step, heading, inputs_every, inputs_late = 0.2, 2, 4, 0.002
     sensors = (Sensor("gps", "position", ("x_gps", "y_gps"), 20, 7, 0.12, 0.03, 0.020, 0.015),
                Sensor("steering", "angle", ("delta",), 5, 2, 0.004, 0.0, 0.012, quantum=0.004))
-    wheelbase, behind = 1.4, 0.4
+    wheelbase, behind, stop = 1.4, 0.4, 0.6
 
     def __init__(self, noise, speed):
         self.noise, self.speed, self.time = noise, speed, 0.0
         self.x = self.y = self.psi = self.delta = self.v = 0.0
         self.kappa, self.mu, self.sideways = Slip(noise, 0.65, 0.98), Slip(noise, 0.75, 1.0), Sideways(noise, 0.01)
         self.pace, self.phase = noise.uniform(0.15, 0.5), noise.uniform(0.0, 6.0)
-        self.spin, self.yaw_rate, self.inputs = 0.0, 0.0, numpy.zeros(2)
+        self.spin, self.yaw_rate, self.inputs, self.command = 0.0, 0.0, numpy.zeros(2), None
 
     @classmethod
     def configuration(cls, estimator):
@@ -99,11 +99,17 @@ class Bicycle:
                 "noise": {"outputs": {"x_gps": 0.03, "y_gps": 0.03, "delta": 0.017}, "inputs": {"u1": 0.1, "u2": 0.1}},
                 "estimator": {"name": estimator, "initial": {"parameters": {"kappa": 0.9, "mu": 0.9}, "sigma": {"beta": 0.3}}}}
 
+    def asked(self):
+        """What its wheels and its steering are to do."""
+        if self.command is None:
+            wanted = 0.35 * math.sin(self.pace * self.time + self.phase)
+            return self.speed * (1.0 + 0.1 * math.sin(0.3 * self.time)), min(max(3.0 * (wanted - self.delta), -0.6), 0.6)
+        least, most = (-self.stop - self.delta) / TICK, (self.stop - self.delta) / TICK
+        return self.command[0], min(max(self.command[1], -0.6, least), 0.6, most)
+
     def advance(self):
         kappa, mu, angle = self.kappa.step(), self.mu.step(), self.sideways.step()
-        wheels = self.speed * (1.0 + 0.1 * math.sin(0.3 * self.time))
-        wanted = 0.35 * math.sin(self.pace * self.time + self.phase)
-        turning = min(max(3.0 * (wanted - self.delta), -0.6), 0.6)
+        wheels, turning = self.asked()
         self.v += (kappa * (1.0 - self.spin) * wheels - self.v) * TICK / 0.1
         self.yaw_rate = self.v / self.wheelbase * math.tan(mu * self.delta)
         self.x += TICK * self.v * math.cos(self.psi + angle)
@@ -169,7 +175,7 @@ class SkidSteer:
         self.x = self.y = self.psi = self.v = self.turn = 0.0
         self.slips, self.ahead_of_centre = (Slip(noise, 0.02, 0.35), Slip(noise, 0.02, 0.35)), Slip(noise, -0.12, 0.12)
         self.pace, self.phase = noise.uniform(0.15, 0.5), noise.uniform(0.0, 6.0)
-        self.spin, self.inputs = 0.0, numpy.zeros(2)
+        self.spin, self.inputs, self.command = 0.0, numpy.zeros(2), None
 
     @classmethod
     def configuration(cls, estimator):
@@ -178,9 +184,15 @@ class SkidSteer:
                 "noise": {"outputs": {"x_gps": 0.02, "y_gps": 0.02, "heading": 0.02}, "inputs": {"omega_left": 0.3, "omega_right": 0.3}},
                 "estimator": {"name": estimator, "horizon": "2 s", "initial": {"sigma": {"psi": 0.3}}}}
 
-    def advance(self):
+    def asked(self):
+        """What the wheels of both sides are to do."""
+        if self.command is not None:
+            return self.radius * numpy.array(self.command)
         wanted = 0.5 * math.sin(self.pace * self.time + self.phase)
-        sides = numpy.array([self.speed - wanted * self.track / 2.0, self.speed + wanted * self.track / 2.0]) * (1.0 + 0.1 * math.sin(0.3 * self.time))
+        return numpy.array([self.speed - wanted * self.track / 2.0, self.speed + wanted * self.track / 2.0]) * (1.0 + 0.1 * math.sin(0.3 * self.time))
+
+    def advance(self):
+        sides = self.asked()
         left, right = ((1.0 - slip.step()) * (1.0 - self.spin) * side for slip, side in zip(self.slips, sides))
         self.v += (0.5 * (left + right) - self.v) * TICK / 0.08
         self.turn += ((right - left) / self.track - self.turn) * TICK / 0.08
@@ -210,7 +222,7 @@ class Tracks:
         self.x = self.y = self.psi = self.v = self.turn = 0.0
         self.straight, self.round, self.sideways = Slip(noise, 0.6, 0.98), Slip(noise, 0.6, 0.98), Sideways(noise, 0.01)
         self.pace, self.phase = noise.uniform(0.15, 0.5), noise.uniform(0.0, 6.0)
-        self.spin, self.inputs = 0.0, numpy.zeros(2)
+        self.spin, self.inputs, self.command = 0.0, numpy.zeros(2), None
 
     @classmethod
     def configuration(cls, estimator):
@@ -219,9 +231,14 @@ class Tracks:
                           "biases": {"yaw_rate": {"sigma": 0.02, "drift": 0.001}}},
                 "estimator": {"name": estimator, "horizon": "3 s", "initial": {"parameters": {"mu": 0.8, "kappa": 0.8}, "sigma": {"psi": 0.3}}}}
 
+    def asked(self):
+        """What its tracks are to do: speed and yaw rate."""
+        if self.command is not None:
+            return self.command
+        return self.speed * (1.0 + 0.1 * math.sin(0.3 * self.time)), 0.5 * math.sin(self.pace * self.time + self.phase)
+
     def advance(self):
-        wanted = 0.5 * math.sin(self.pace * self.time + self.phase)
-        speed = self.speed * (1.0 + 0.1 * math.sin(0.3 * self.time))
+        speed, wanted = self.asked()
         self.v += (self.straight.step() * (1.0 - self.spin) * speed - self.v) * TICK / 0.1
         self.turn += (self.round.step() * wanted - self.turn) * TICK / 0.1
         angle = self.sideways.step()

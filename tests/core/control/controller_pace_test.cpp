@@ -90,8 +90,23 @@ TEST(ControllerPace, AHeadingIsSearchedAtFullSpeed) {
   for (int k = 0; k < 20; ++k) EXPECT_NEAR(drive.go_on(HealthLevel::lost, reason::starting), speed, 0.02);
 }
 
+TEST(ControllerPace, AHeadingThatIsNotKnownAnyMoreIsSoughtSlowly) {
+  for (const double share : {0.3, 0.2, 0.0}) {
+    Drive drive(share == 0.3 ? "" : ", controller: {health: {heading: " + std::to_string(share) + "}}");
+    for (int k = 0; k < 10; ++k) drive.go_on(HealthLevel::ok);
+    // Neither is known, as without a receiver; then it comes back.
+    double now = speed;
+    for (int k = 0; k < 30; ++k) now = drive.go_on(HealthLevel::lost, reason::uncertain);
+    EXPECT_EQ(now, 0.0);
+    for (int k = 0; k < 30; ++k) now = drive.go_on(HealthLevel::lost, reason::uncertain | reason::heading);
+    EXPECT_NEAR(now, share * speed, 0.05) << share;
+    for (int k = 0; k < 30; ++k) now = drive.go_on(HealthLevel::ok);
+    EXPECT_NEAR(now, speed, 0.05);
+  }
+}
+
 TEST(ControllerPace, WrongSharesAreRefused) {
-  for (const char* wrong : {"degraded: 1.5", "lost: -0.1", "seconds: 0"})
+  for (const char* wrong : {"degraded: 1.5", "lost: -0.1", "heading: 2", "seconds: 0"})
     EXPECT_THAT(error_of([&] { Drive drive(std::string(", controller: {health: {") + wrong + "}}"); }),
                 HasSubstr(std::string(wrong).substr(0, 4)));
 }

@@ -174,5 +174,45 @@ TEST_P(Starts, KnowNoHeadingBeforeTheVehicleMoves) {
   }
 }
 
+/// A receiver is silent for 30 s; the vehicle is lost meanwhile, stops, and stands there when its fixes come back. They
+/// say where it is, and nothing where it heads.
+TEST_P(Starts, SayThatAHeadingIsNotKnownAnyMoreWhereThePlaceIs) {
+  constexpr double speed = 2.0, wheelbase = 1.4, antenna = 0.4, tick = 0.01, stops = 40.0, returns = 45.0,
+                   goes_on = 52.0;
+  const auto estimator = robot(GetParam(), 0.1).make_estimator();
+  std::mt19937_64 random(6);
+  std::normal_distribution<double> noise;
+  Eigen::Vector4d truth(0.0, 0.0, 0.0, 0.0);
+  double ok_since = 1e9;
+  for (int i = 0; i < 6500; ++i) {
+    const double time = tick * i, rate = 0.15 * std::cos(0.5 * time);
+    const double wheels = time < stops || time > goes_on ? speed : 0.0;
+    if (i % 20 == 0) estimator->push_input(time, std::vector<double>{wheels, rate}.data());
+    if (i % 5 == 1)
+      estimator->push_measurement(time, std::vector<double>{nan, nan, truth[3] + 0.01 * noise(random)}.data());
+    if (i % 20 == 13 && (time < 10.0 || time > returns))
+      estimator->push_measurement(
+          time, std::vector<double>{truth[0] - antenna * std::cos(truth[2]) + 0.03 * noise(random),
+                                    truth[1] - antenna * std::sin(truth[2]) + 0.03 * noise(random), nan}
+                    .data());
+    truth[0] += tick * 0.8 * wheels * std::cos(truth[2]);
+    truth[1] += tick * 0.8 * wheels * std::sin(truth[2]);
+    truth[2] += tick * 0.8 * wheels / wheelbase * std::tan(0.8 * truth[3]);
+    truth[3] += tick * rate;
+    if (i % 20 != 19) continue;
+    const Health& health = estimator->estimate(time).health;
+    SCOPED_TRACE(time);
+    const bool is_lost = health.level == HealthLevel::lost, is_sought = (health.reasons & reason::heading) != 0;
+    if (time < 9.0 || health.level == HealthLevel::ok) {
+      EXPECT_FALSE(is_lost || is_sought);
+    } else if (time > stops && time < goes_on && std::abs(time - returns - 0.5) > 0.5) {
+      EXPECT_TRUE(is_lost);
+      EXPECT_EQ(is_sought, time > returns);
+    }
+    if (time > goes_on) ok_since = health.level == HealthLevel::ok ? std::min(ok_since, time) : 1e9;
+  }
+  EXPECT_LT(ok_since, goes_on + 6.0);
+}
+
 }  // namespace sensor_start_test
 }  // namespace rhec

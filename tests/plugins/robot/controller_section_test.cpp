@@ -11,6 +11,7 @@ namespace rhec {
 namespace controller_section_test {
 
 using testing::AllOf;
+using testing::DoubleNear;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::StartsWith;
@@ -25,7 +26,8 @@ TEST(ControllerSection, HasTheDocumentedDefaults) {
   const auto made = controller("");
   const RhcProblem::Setup& problem = problem_of(*made);
   EXPECT_THAT(problem.state_weights, ElementsAre(1.0, 1.0, 0.0, 0.0));
-  EXPECT_THAT(problem.input_weights, ElementsAre(5.0, 5.0));
+  const double steering_rate = host().make_model("bicycle_slip")->description().inputs[1].scale;
+  EXPECT_THAT(problem.input_weights, ElementsAre(5.0, DoubleNear(0.02 / (steering_rate * steering_rate), 1e-12)));
   EXPECT_THAT(problem.terminal_weights, ElementsAre(10.0, 10.0, 0.0, 0.0));
   EXPECT_TRUE(problem.blocked_inputs.empty());
 
@@ -40,7 +42,7 @@ TEST(ControllerSection, HasTheDocumentedDefaults) {
   EXPECT_EQ(shown("speed_bound_factor"), NumberValue{}.print(options.speed_bound_factor));
   EXPECT_EQ(shown("speed_bound_offset"), NumberValue{}.print(options.speed_bound_offset));
   EXPECT_EQ(shown("weights.stage.STATE"), "1 for the position, 5 for a speed, else 0");
-  EXPECT_EQ(shown("weights.stage.INPUT"), "5");
+  EXPECT_EQ(shown("weights.stage.INPUT"), "5 for a speed, else 0.02 / typical^2");
   EXPECT_EQ(shown("weights.terminal.STATE"), "10 for the position, else 0");
   EXPECT_EQ(shown("solver.name"), ControllerSection(context_with(), {}).solver_choice().name);
 }

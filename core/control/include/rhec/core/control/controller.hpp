@@ -53,10 +53,10 @@ class RHEC_EXPORT Controller {
     std::vector<double> rate_lower, rate_upper;  ///< n_u, bounds of rates [unit of the input / s]; empty: none
     PathFollower::Window search;
     /// Share of the path's speeds while an estimate's health is not `ok`. It changes over time, so that the vehicle
-    /// slows, stops on the path, and starts again. While a heading is searched for the first time, which takes motion,
-    /// all is as with `ok`.
+    /// slows, stops on the path, and starts again. A heading is not found without motion: while it is searched for the
+    /// first time all is as with `ok`, and later, where the place is known (reason::heading), the share is `heading`.
     struct Pace {
-      double degraded = 0.6, lost = 0.0;
+      double degraded = 0.6, lost = 0.0, heading = 0.3;
       double seconds = 3.0;  ///< from the full speed to a stop, and back [s]
     } pace = {};
     /// What slip to expect ahead; null: that of the estimate, everywhere.

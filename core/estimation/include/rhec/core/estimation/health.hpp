@@ -28,7 +28,9 @@ inline constexpr std::uint32_t clock = 1u << 5;        ///< a stamp that cannot 
 inline constexpr std::uint32_t uncertain = 1u << 6;    ///< a standard deviation above the limit
 inline constexpr std::uint32_t starting = 1u << 7;     ///< no measurement yet, or the heading is being searched
 inline constexpr std::uint32_t off = 1u << 8;          ///< its values are off by a constant, which is taken out of them
-inline constexpr std::uint32_t all[] = {rejected, stuck, silent, implausible, moved, clock, uncertain, starting, off};
+inline constexpr std::uint32_t heading = 1u << 9;      ///< where it is is known, where it heads is not: motion tells it
+inline constexpr std::uint32_t all[] = {rejected, stuck,     silent,   implausible, moved,
+                                        clock,    uncertain, starting, off,         heading};
 }  // namespace reason
 
 /// Of one sensor, or of the measured inputs.

@@ -17,6 +17,7 @@ namespace rhec {
 /// The keys of `controller.health`: how fast the vehicle is while an estimate's health is not `ok`.
 struct RHEC_EXPORT PaceOptions {
   double degraded = Controller::Setup::Pace{}.degraded, lost = Controller::Setup::Pace{}.lost;
+  double heading = Controller::Setup::Pace{}.heading;
   double seconds = Controller::Setup::Pace{}.seconds;
   static const OptionTable<PaceOptions>& table();
 };
