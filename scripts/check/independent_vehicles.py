@@ -375,19 +375,10 @@ class Shuttle(Bicycle):
             left -= length
         return 0.0
 
-    def advance(self):
-        kappa, mu, angle = self.kappa.step(), self.mu.step(), self.sideways.step()
+    def asked(self):
         self.wheels += min(max(self.wanted() - self.wheels, -1.5 * TICK), 1.5 * TICK)
         wanted = 0.35 * math.sin(self.pace * self.time + self.phase)
-        turning = min(max(3.0 * (wanted - self.delta), -0.6), 0.6) if self.wheels != 0.0 else 0.0
-        self.v += (kappa * (1.0 - self.spin) * self.wheels - self.v) * TICK / 0.1
-        self.yaw_rate = self.v / self.wheelbase * math.tan(mu * self.delta)
-        self.x += TICK * self.v * math.cos(self.psi + angle)
-        self.y += TICK * self.v * math.sin(self.psi + angle)
-        self.psi += TICK * self.yaw_rate
-        self.delta += TICK * turning
-        self.time += TICK
-        self.inputs = numpy.array([self.wheels, turning])
+        return self.wheels, min(max(3.0 * (wanted - self.delta), -0.6), 0.6) if self.wheels != 0.0 else 0.0
 
 
 class Misbuilt(Rover):

@@ -5,7 +5,7 @@
 
 A file that passed is not looked at again until it, a header of ours that it includes, its flags, .clang-tidy or
 clang-tidy itself changes; what passed is kept in <build directory>/clang-tidy. --recent N, for a test that begins with
-nothing: what the last N commits have changed, or is not committed, and one in eight of the other folders, another one after
+nothing: what the last N commits have changed, or is not committed, and one in sixteen of the other folders, others after
 each commit; everything where git does not say what has changed. --thorough, for the night: with checks that take long and
 find little, and each file by itself, so that none has a header from the one before it.
 """
@@ -42,7 +42,7 @@ QUICK = ["--extra-arg=-fdelayed-template-parsing"]
 # Of a folder so many sources are looked at together. Where others of it have passed, so few are looked at one by one.
 MOST, FEW = 20, 2
 # With --recent one in so many of the folders that have not changed is looked at.
-OTHERS = 8
+OTHERS = 16
 
 
 def singles(entry):
