@@ -172,7 +172,7 @@ void SensorJudge::note_volume(const Estimate& estimate) noexcept {
     usual_volume_ += (volume - usual_volume_) / volume_memory;
 }
 
-/// Whether a position is measured, and not for too long no more.
+/// Whether something says where the vehicle is: a sensor of the position that is not silent.
 bool SensorJudge::is_place_measured(std::span<const Presence> presence) const noexcept {
   for (std::size_t s = 0; s < sensors_.size(); ++s)
     if (presence[s] != Presence::silent && sees_position(sensors_[s].outputs)) return true;

@@ -5,6 +5,7 @@ import numpy
 
 BEGAN = 2.3 * 604800.0      # [s] the vehicles' clocks at the start
 START, LENGTH = 40.0, 100.0  # [s] of the fault and of the drive
+SETTLES = (".moved", ".rotate")  # what leaves a receiver elsewhere, whose coordinates count in the end
 MOVED = 5.0                 # [m] by which a receiver is off
 TURN = 0.3                  # [rad] of a receiver's coordinates
 TURNED = numpy.array([[math.cos(TURN), -math.sin(TURN)], [math.sin(TURN), math.cos(TURN)]])
