@@ -12,18 +12,12 @@
 #include "models/bicycle_slip/bicycle_slip.hpp"
 #include "rhec/core/model/formula_model.hpp"
 #include "support/error_of.hpp"
+#include "support/temporary_folder.hpp"
 
 namespace rhec {
 namespace write_model_code_test {
 
 namespace fs = std::filesystem;
-
-/// A folder that is gone after the test.
-struct Folder {
-  fs::path path = fs::temp_directory_path() / ("rhec_write_model_code_test_" + std::to_string(::getpid()));
-  Folder() { fs::create_directories(path); }
-  ~Folder() { fs::remove_all(path); }
-};
 
 std::string content(const fs::path& file) {
   std::ifstream in(file, std::ios::binary);
@@ -31,12 +25,12 @@ std::string content(const fs::path& file) {
 }
 
 TEST(WriteModelCodeTo, LeavesFilesAloneThatAreAsTheyWouldBeWritten) {
-  const Folder folder;
+  const TemporaryFolder folder;
   const auto write = [&](const char* set) {
-    write_model_code_to(trace<BicycleSlip>(), "bicycle", "rhec::BicycleSlip", {folder.path.string(), "generic", set});
+    write_model_code_to(trace<BicycleSlip>(), "bicycle", "rhec::BicycleSlip", {folder.path().string(), "generic", set});
   };
   write("avx2");
-  const fs::path kernels = folder.path / "kernels.cpp", table = folder.path / "table.cpp";
+  const fs::path kernels = folder / "kernels.cpp", table = folder / "table.cpp";
   const std::string kernels_text = content(kernels), table_text = content(table);
   ASSERT_FALSE(kernels_text.empty());
   ASSERT_FALSE(table_text.empty());

@@ -5,9 +5,9 @@
 
 #include <cmath>
 
-#include "logs/support/files.hpp"
 #include "logs/support/rows.hpp"
 #include "support/error_of.hpp"
+#include "support/temporary_folder.hpp"
 
 namespace rhec::logs {
 namespace csv_log_test {
@@ -15,10 +15,10 @@ namespace csv_log_test {
 using testing::AllOf;
 using testing::HasSubstr;
 
-class CsvLogTest : public FilesTest {
+class CsvLogTest : public FolderTest {
  protected:
   Rows rows(const std::string& text, const FieldRequest& request) {
-    return rows_of(*open_csv(write("drive.csv", text)), "", request);
+    return rows_of(*open_csv(put("drive.csv", text)), "", request);
   }
 };
 
@@ -51,7 +51,7 @@ TEST_F(CsvLogTest, ReadsWhatSpreadsheetsInEuropeWrite) {
   EXPECT_EQ(found.values[0], (std::vector<double>{3.6, -1.5}));
   EXPECT_EQ(found.values[1], (std::vector<double>{7.2, 0.0}));
   EXPECT_EQ(found.stamps, (std::vector<Stamp>{1714564800500000000, 1714564801500000000}));
-  const auto log = open_csv(path("drive.csv"));
+  const auto log = open_csv(file("drive.csv"));
   EXPECT_EQ(log->unit_of(0, "speed"), "km/h");
   EXPECT_EQ(log->unit_of(0, "steer"), "deg");
   EXPECT_EQ(log->unit_of(0, "time"), "");
@@ -79,11 +79,11 @@ TEST_F(CsvLogTest, ALineIsNotLongerThanMemory) {
 }
 
 TEST_F(CsvLogTest, SaysWhatIsWrongWithAFile) {
-  const auto message = [&](const std::string& text) { return error_of([&] { open_csv(write("x.csv", text)); }); };
+  const auto message = [&](const std::string& text) { return error_of([&] { open_csv(put("x.csv", text)); }); };
   EXPECT_THAT(message("0,1,2\n1,2,3\n"), AllOf(HasSubstr("x.csv:1"), HasSubstr("expected a header")));
   EXPECT_THAT(message(""), HasSubstr("found nothing, expected a header"));
   EXPECT_THAT(message("time,x,x\n"), HasSubstr("two columns are called 'x'"));
-  EXPECT_THAT(error_of([&] { open_csv(path("gone.csv")); }), HasSubstr("No such file"));
+  EXPECT_THAT(error_of([&] { open_csv(file("gone.csv")); }), HasSubstr("No such file"));
   EXPECT_THAT(error_of([&] { rows("time,speed\n0,1\n", {{"sped"}}); }), HasSubstr("did you mean 'speed'"));
   EXPECT_THAT(error_of([&] { rows("when,speed\n0,1\n", {{"speed"}}); }), HasSubstr("signals.clock"));
   EXPECT_THAT(error_of([&] { rows("time [h],speed\n0,1\n", {{"speed"}}); }), HasSubstr("[h]"));

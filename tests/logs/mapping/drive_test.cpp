@@ -6,7 +6,6 @@
 #include <cmath>
 
 #include "logs/support/described.hpp"
-#include "logs/support/files.hpp"
 #include "rhec/logs/cdr/cdr_writer.hpp"
 #include "rhec/logs/cdr/message_definitions.hpp"
 #include "rhec/logs/csv/csv_log.hpp"
@@ -14,16 +13,17 @@
 #include "rhec/logs/mcap/mcap_writer.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
 #include "support/error_of.hpp"
+#include "support/temporary_folder.hpp"
 
 namespace rhec::logs {
 namespace drive_test {
 
 using testing::HasSubstr;
 
-class DriveTest : public FilesTest {
+class DriveTest : public FolderTest {
  protected:
   Drive drive(const std::string& table, const std::string& signals) {
-    return read_drive(*open_csv(write("d.csv", table)), SignalMap(parse_yaml(signals, "robot.yaml"), described()));
+    return read_drive(*open_csv(put("d.csv", table)), SignalMap(parse_yaml(signals, "robot.yaml"), described()));
   }
   static std::vector<double> values(const Drive& drive, std::size_t event) {
     const double* begin = drive.values_of(drive.events[event]);
@@ -94,7 +94,7 @@ class BagTest : public DriveTest {
  protected:
   Drive bag(Stamp wheel_clock, Stamp odometry_clock, const std::string& more = "") {
     {
-      McapWriter writer(path("b.mcap"));
+      McapWriter writer(file("b.mcap"));
       const auto channel = [&](const char* topic, const char* type) {
         return writer.add_channel(topic, type, ros2msg_text(type, builtin_definitions()));
       };
@@ -123,7 +123,7 @@ class BagTest : public DriveTest {
       writer.close();
     }
     return read_drive(
-        *open_mcap(path("b.mcap")),
+        *open_mcap(file("b.mcap")),
         SignalMap(
             parse_yaml(
                 "{outputs: {x_gps: {from: /fix, as: east}, y_gps: {from: /fix, as: north}, psi_m: none, delta: "

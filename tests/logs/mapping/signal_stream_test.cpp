@@ -6,22 +6,22 @@
 #include <cmath>
 
 #include "logs/support/described.hpp"
-#include "logs/support/files.hpp"
 #include "rhec/logs/csv/csv_log.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
 #include "support/error_of.hpp"
+#include "support/temporary_folder.hpp"
 
 namespace rhec::logs {
 namespace signal_stream_test {
 
 // What rows are made of is tested with drives (drive_test.cpp); here is what a stream has of its own.
-class SignalStreamTest : public FilesTest {
+class SignalStreamTest : public FolderTest {
  protected:
   SignalMap map(const std::string& signals) const { return SignalMap(parse_yaml(signals, "robot.yaml"), described()); }
 };
 
 TEST_F(SignalStreamTest, RowsComeRecordByRecordOutputsFirst) {
-  const auto log = open_csv(write("d.csv", "time,x_gps,y_gps,delta,v\n1,2,3,0.1,5\n2,,4,,\n3,,,,\n"));
+  const auto log = open_csv(put("d.csv", "time,x_gps,y_gps,delta,v\n1,2,3,0.1,5\n2,,4,,\n3,,,,\n"));
   SignalStream stream(*log, map("{outputs: {psi_m: none}, inputs: {delta_rate: none}}"));
   EXPECT_EQ(stream.wanted(), (std::vector<bool>{true}));
   std::vector<std::vector<SignalRow>> found;
@@ -47,7 +47,7 @@ TEST_F(SignalStreamTest, RowsComeRecordByRecordOutputsFirst) {
 
 TEST_F(SignalStreamTest, AConditionLeavesValuesOut) {
   const auto log =
-      open_csv(write("d.csv", "time,e,status,var,v\n1,10,2,0.01,5\n2,20,1,0.01,5\n3,30,2,4,5\n4,40,,0.01,5\n"));
+      open_csv(put("d.csv", "time,e,status,var,v\n1,10,2,0.01,5\n2,20,1,0.01,5\n3,30,2,4,5\n4,40,,0.01,5\n"));
   SignalStream stream(*log, map("outputs: {psi_m: none, delta: none, y_gps: none, x_gps: {from: e, when: [{of: status, "
                                 "at_least: 2}, {of: var, at_most: 1}]}}\ninputs: {delta_rate: none}"));
   std::vector<double> found;
@@ -63,9 +63,9 @@ TEST_F(SignalStreamTest, AConditionLeavesValuesOut) {
 
 /// In the variable's unit; what is not above 0 is not known.
 TEST_F(SignalStreamTest, RecordsSayHowAccurateTheyAre) {
-  const auto log = open_csv(write("d.csv",
-                                  "time,e,var,psi,sd,v\n1,10,0.04,90,2,5\n2,20,0,90,,5\n3,30,-1,90,1,5\n"
-                                  "4,40,1e-8,,3,5\n"));
+  const auto log = open_csv(put("d.csv",
+                                "time,e,var,psi,sd,v\n1,10,0.04,90,2,5\n2,20,0,90,,5\n3,30,-1,90,1,5\n"
+                                "4,40,1e-8,,3,5\n"));
   SignalStream stream(*log, map("outputs: {delta: none, y_gps: none, x_gps: {from: e, variance: var, sigma_scale: 1.5, "
                                 "least_sigma: 0.01}, psi_m: {from: psi, unit: deg, sign: -1, sigma: sd}}\n"
                                 "inputs: {delta_rate: none}"));
@@ -91,7 +91,7 @@ TEST_F(SignalStreamTest, RecordsSayHowAccurateTheyAre) {
 }
 
 TEST_F(SignalStreamTest, ACounterpartTakesWhatAnotherLeavesOut) {
-  const auto log = open_csv(write("d.csv", "time,e,status,v\n1,10,2,5\n2,20,1,5\n3,30,2,5\n"));
+  const auto log = open_csv(put("d.csv", "time,e,status,v\n1,10,2,5\n2,20,1,5\n3,30,2,5\n"));
   SignalStream stream(*log,
                       map("outputs: {psi_m: none, delta: none, x_gps: {from: e, when: {of: status, at_least: 2}}, "
                           "y_gps: {from: e, when: {of: status, at_most: 1}}}\ninputs: {delta_rate: none}"));
@@ -107,7 +107,7 @@ TEST_F(SignalStreamTest, ACounterpartTakesWhatAnotherLeavesOut) {
 TEST_F(SignalStreamTest, RatesOfCountersThatBeginAnew) {
   const std::string table = "time,a,x_gps\n0,65530,0\n1,4,0\n2,65534,0\n3,24,0\n";
   const auto rates_of = [&](const std::string& how) {
-    const auto log = open_csv(write("d.csv", table));
+    const auto log = open_csv(put("d.csv", table));
     SignalStream stream(*log,
                         map("{outputs: {y_gps: none, psi_m: none, delta: none}, inputs: {v: {from: a, counts: 100, "
                             "radius: 0.5, derivative: true" +
@@ -134,7 +134,7 @@ TEST_F(SignalStreamTest, AnAngleBeyondATurnCountsTurns) {
        {std::tuple("", "time,a,x_gps\n0,10,0\n1,14,0\n2,18,0\n", 4.0),
         std::tuple("", "time,a,x_gps\n0,3,0\n1,-3,0\n2,-2.5,0\n", 2.0 * M_PI - 6.0),
         std::tuple(", wraps: 0", "time,a,x_gps\n0,0,0\n1,4,0\n2,8,0\n", 4.0)}) {
-    const auto log = open_csv(write("d.csv", table));
+    const auto log = open_csv(put("d.csv", table));
     SignalStream stream(*log, map(std::string("{outputs: {y_gps: none, psi_m: none, delta: none}, inputs: {v: none, "
                                               "delta_rate: {from: a, derivative: true") +
                                   how + "}}}"));
@@ -152,7 +152,7 @@ TEST_F(SignalStreamTest, AnAngleBeyondATurnCountsTurns) {
 TEST_F(SignalStreamTest, AnOutputMayBeARate) {
   ModelDescription about = described();
   about.outputs[3] = {.name = "ground_speed", .unit = "m/s", .meaning = "speed over ground"};
-  const auto log = open_csv(write("d.csv", "time,odometer\n10,5\n11,7\n13,7\n"));
+  const auto log = open_csv(put("d.csv", "time,odometer\n10,5\n11,7\n13,7\n"));
   SignalStream stream(*log, SignalMap(parse_yaml("{outputs: {x_gps: none, y_gps: none, psi_m: none, ground_speed: "
                                                  "{from: odometer, unit: m, derivative: true}}, "
                                                  "inputs: {v: none, delta_rate: none}}",
@@ -168,7 +168,7 @@ TEST_F(SignalStreamTest, AnOutputMayBeARate) {
 
 TEST_F(SignalStreamTest, TheHeadOfAColumnSaysItsUnit) {
   const auto value_of = [&](const std::string& table, const std::string& delta) {
-    const auto log = open_csv(write("d.csv", table));
+    const auto log = open_csv(put("d.csv", table));
     SignalStream stream(*log, map("{outputs: {x_gps: none, y_gps: none, psi_m: none, delta: " + delta +
                                   "}, inputs: {v: none, delta_rate: none}}"));
     double value = 0.0;
@@ -190,7 +190,7 @@ TEST_F(SignalStreamTest, TheHeadOfAColumnSaysItsUnit) {
 
 /// As PlotJuggler names them.
 TEST_F(SignalStreamTest, ColumnsMayHaveNamesOfTopics) {
-  const auto log = open_csv(write("d.csv", "__time,/fix/altitude,/a:b\n1,2,3\n"));
+  const auto log = open_csv(put("d.csv", "__time,/fix/altitude,/a:b\n1,2,3\n"));
   SignalStream stream(*log, map("{outputs: {x_gps: /fix/altitude, y_gps: {from: '/a:b', when: {of: /fix/altitude, "
                                 "at_most: 2}}, psi_m: none, delta: none}, inputs: {v: none, delta_rate: none}}"));
   log->read(stream.wanted(), [&](const Record& record) {
@@ -204,7 +204,7 @@ TEST_F(SignalStreamTest, ColumnsMayHaveNamesOfTopics) {
 }
 
 TEST_F(SignalStreamTest, BegunAnewItForgetsWhatDerivativesHaveInHand) {
-  const auto log = open_csv(write("d.csv", "time,delta\n10,0.1\n11,0.3\n1,0.5\n2,0.6\n"));
+  const auto log = open_csv(put("d.csv", "time,delta\n10,0.1\n11,0.3\n1,0.5\n2,0.6\n"));
   for (const bool begins_anew : {false, true}) {
     SignalStream stream(*log, map("{outputs: {x_gps: none, y_gps: none, psi_m: none, delta: none}, "
                                   "inputs: {v: none, delta_rate: {from: delta, derivative: true}}}"));
@@ -222,7 +222,7 @@ TEST_F(SignalStreamTest, BegunAnewItForgetsWhatDerivativesHaveInHand) {
 }
 
 TEST_F(SignalStreamTest, TheFirstGoodFixIsTheOrigin) {
-  const auto log = open_csv(write("d.csv", "time,lat,lon\n1,95,7\n2,51,7\n3,52,7\n"));
+  const auto log = open_csv(put("d.csv", "time,lat,lon\n1,95,7\n2,51,7\n3,52,7\n"));
   SignalStream stream(*log, map("{outputs: {x_gps: {from: [lat, lon], as: east}, y_gps: {from: [lat, lon], as: north}, "
                                 "psi_m: none, delta: none}, inputs: {v: none, delta_rate: none}}"));
   std::vector<double> north;

@@ -7,29 +7,29 @@
 #include <cstdint>
 #include <cstring>
 
-#include "logs/support/files.hpp"
 #include "logs/support/rows.hpp"
 #include "logs/support/small_mcap.hpp"
 #include "rhec/logs/storage/compression.hpp"
 #include "support/error_of.hpp"
+#include "support/temporary_folder.hpp"
 
 namespace rhec::logs {
 namespace mcap_log_test {
 
 using testing::HasSubstr;
 
-class McapLogTest : public FilesTest {
+class McapLogTest : public FolderTest {
  protected:
-  Rows rows(const std::string& content) { return rows_of(*open_mcap(write("y.mcap", content)), "/a", {{"data"}}); }
+  Rows rows(const std::string& content) { return rows_of(*open_mcap(put("y.mcap", content)), "/a", {{"data"}}); }
   std::string small(int count, std::size_t filling = 0) {
-    write_small_mcap(path("x.mcap"), count, filling);
-    return content_of(path("x.mcap"));
+    write_small_mcap(file("x.mcap"), count, filling);
+    return content_of(file("x.mcap"));
   }
 };
 
 /// As rosbag2 writes with `compression_mode: message`.
 TEST_F(McapLogTest, MessagesMayBeCompressedOneByOne) {
-  McapWriter writer(path("x.mcap"));
+  McapWriter writer(file("x.mcap"));
   const std::uint16_t a = writer.add_channel("/a", "std_msgs/msg/Float64", "float64 data");
   for (int i = 0; i < 3; ++i) {
     CdrWriter message;
@@ -40,7 +40,7 @@ TEST_F(McapLogTest, MessagesMayBeCompressedOneByOne) {
     writer.write(a, Stamp{1'000'000} * (i + 1), block);
   }
   writer.close();
-  const Rows found = rows_of(*open_mcap(path("x.mcap")), "/a", {{"data"}});
+  const Rows found = rows_of(*open_mcap(file("x.mcap")), "/a", {{"data"}});
   ASSERT_EQ(found.values.size(), 2u);
   EXPECT_EQ(found.values[1][0], 2.0);
   ASSERT_TRUE(found.damage);
@@ -48,7 +48,7 @@ TEST_F(McapLogTest, MessagesMayBeCompressedOneByOne) {
 }
 
 TEST_F(McapLogTest, ATypeMayBeDefinedAnewOnTheWay) {
-  McapWriter writer(path("x.mcap"));
+  McapWriter writer(file("x.mcap"));
   for (const char* definition : {"float64 x", "float64 added\nfloat64 x"}) {
     const bool is_second = definition[8] == 'a';
     const std::uint16_t channel = writer.add_channel("/a", "my_msgs/msg/A", definition);
@@ -58,7 +58,7 @@ TEST_F(McapLogTest, ATypeMayBeDefinedAnewOnTheWay) {
     writer.write(channel, 1'000'000, message.bytes());
   }
   writer.close();
-  const auto log = open_mcap(path("x.mcap"));
+  const auto log = open_mcap(file("x.mcap"));
   ASSERT_EQ(log->topics().size(), 1u);
   EXPECT_EQ(log->topics()[0].count, 2);
   const Rows found = rows_of(*log, "/a", {{"x", "added"}});
@@ -87,7 +87,7 @@ TEST_F(McapLogTest, ACutFileGivesWhatIsBeforeTheCut) {
 TEST_F(McapLogTest, EveryCutIsAnswered) {
   const std::string whole = small(20);
   for (std::size_t size = 8; size < whole.size(); size += 7) {
-    const auto log = open_mcap(write("y.mcap", whole.substr(0, size)));
+    const auto log = open_mcap(put("y.mcap", whole.substr(0, size)));
     std::int64_t count = 0;
     static_cast<void>(
         log->read(std::vector<bool>(log->topics().size(), true), [&](const Record&) { return ++count < 100; }));
@@ -111,7 +111,7 @@ TEST_F(McapLogTest, WithoutASummaryItIsGoneThroughOnce) {
   // The footer's place of the summary, 8 bytes before its own second half, becomes 0: there is none.
   const std::size_t footer = content.size() - 8 - 20;
   for (std::size_t i = 0; i < 20; ++i) content[footer + i] = 0;
-  const auto log = open_mcap(write("y.mcap", content));
+  const auto log = open_mcap(put("y.mcap", content));
   EXPECT_EQ(log->topics().size(), 3u);
   EXPECT_EQ(log->topics()[0].count, 100);
   EXPECT_EQ(rows_of(*log, "/a", {{"data"}}).values.size(), 100u);
@@ -121,7 +121,7 @@ TEST_F(McapLogTest, ALengthThatIsALieTakesNoMemory) {
   std::string content = small(10);
   const std::string huge(8, '\x7F');
   content.replace(8 + 1, 8, huge);  // of the first record
-  EXPECT_THAT(open_mcap(write("y.mcap", content))->read({true, true, true}, [](const Record&) { return true; })->what,
+  EXPECT_THAT(open_mcap(put("y.mcap", content))->read({true, true, true}, [](const Record&) { return true; })->what,
               HasSubstr("byte 8: found a record of"));
 }
 
@@ -137,14 +137,14 @@ TEST_F(McapLogTest, ALengthThatLeadsBackIsGoneThroughOnce) {
   while (content.at(chunk) != '\x06') chunk += 9 + length_at(chunk);
   const std::uint64_t back = std::uint64_t{0} - 9;
   std::memcpy(content.data() + chunk + 1, &back, sizeof(back));
-  const auto log = open_mcap(write("y.mcap", content));
+  const auto log = open_mcap(put("y.mcap", content));
   const auto damage = log->read(std::vector<bool>(log->topics().size(), false), [](const Record&) { return true; });
   ASSERT_TRUE(damage);
   EXPECT_THAT(damage->what, HasSubstr("found the end"));
 }
 
 TEST_F(McapLogTest, RefusesWhatIsNoMcap) {
-  EXPECT_THAT(error_of([&] { open_mcap(write("y.mcap", "time,x\n")); }), HasSubstr("found no MCAP"));
+  EXPECT_THAT(error_of([&] { open_mcap(put("y.mcap", "time,x\n")); }), HasSubstr("found no MCAP"));
 }
 
 }  // namespace mcap_log_test

@@ -3,21 +3,21 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "logs/support/files.hpp"
 #include "logs/support/rows.hpp"
 #include "logs/support/small_mcap.hpp"
 #include "rhec/logs/mcap/mcap_log.hpp"
 #include "support/error_of.hpp"
+#include "support/temporary_folder.hpp"
 
 namespace rhec::logs {
 namespace mcap_writer_test {
 
-using McapWriterTest = FilesTest;
+using McapWriterTest = FolderTest;
 
 TEST_F(McapWriterTest, WhatItWritesIsReadInOrderOverManyChunks) {
-  write_small_mcap(path("x.mcap"), 5000, 1000);
-  EXPECT_GT(std::filesystem::file_size(path("x.mcap")), 4'000'000u);
-  const auto log = open_mcap(path("x.mcap"));
+  write_small_mcap(file("x.mcap"), 5000, 1000);
+  EXPECT_GT(std::filesystem::file_size(file("x.mcap")), 4'000'000u);
+  const auto log = open_mcap(file("x.mcap"));
   ASSERT_EQ(log->topics().size(), 3u);
   EXPECT_EQ(log->topics()[0].count, 5000);
   const Rows rows = rows_of(*log, "/b", {{"data"}});
@@ -31,11 +31,11 @@ TEST_F(McapWriterTest, WhatItWritesIsReadInOrderOverManyChunks) {
 
 TEST_F(McapWriterTest, AFileAppearsWhenItIsCompleteAndNotBefore) {
   {
-    McapWriter writer(path("x.mcap"));
-    EXPECT_FALSE(std::filesystem::exists(path("x.mcap")));
+    McapWriter writer(file("x.mcap"));
+    EXPECT_FALSE(std::filesystem::exists(file("x.mcap")));
   }
-  EXPECT_TRUE(std::filesystem::is_empty(path("")));
-  EXPECT_THAT(error_of([&] { McapWriter writer(write("file", "") / "x.mcap"); }),
+  EXPECT_TRUE(std::filesystem::is_empty(file("")));
+  EXPECT_THAT(error_of([&] { McapWriter writer(put("file", "") / "x.mcap"); }),
               testing::HasSubstr("cannot be written"));
 }
 

@@ -2,24 +2,24 @@
 #include <gtest/gtest.h>
 #include <sqlite3.h>
 
-#include "logs/support/files.hpp"
 #include "logs/support/rows.hpp"
 #include "rhec/logs/cdr/cdr_writer.hpp"
 #include "rhec/logs/rosbag2/rosbag2.hpp"
 #include "rhec/logs/storage/compression.hpp"
 #include "support/error_of.hpp"
+#include "support/temporary_folder.hpp"
 
 namespace rhec::logs {
 namespace db3_log_test {
 
 using testing::HasSubstr;
 
-class Db3LogTest : public FilesTest {
+class Db3LogTest : public FolderTest {
  protected:
   /// A bag as ROS 2 Humble writes it: no definitions.
   std::filesystem::path bag(int count, bool is_compressed = false, const std::string& type = "std_msgs/msg/Float64") {
     sqlite3* database = nullptr;
-    sqlite3_open(path("x.db3").c_str(), &database);
+    sqlite3_open(file("x.db3").c_str(), &database);
     sqlite3_exec(
         database,
         ("CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT, type TEXT, serialization_format TEXT, "
@@ -45,7 +45,7 @@ class Db3LogTest : public FilesTest {
     sqlite3_finalize(insert);
     sqlite3_exec(database, "COMMIT", nullptr, nullptr, nullptr);
     sqlite3_close(database);
-    return path("x.db3");
+    return file("x.db3");
   }
 };
 
@@ -61,16 +61,16 @@ TEST_F(Db3LogTest, ReadsMessagesThatAreCompressedOneByOne) {
 }
 
 TEST_F(Db3LogTest, OtherTypesAreDefinedByFolders) {
-  const auto file = bag(3, false, "mine/msg/Speed");
-  EXPECT_THAT(error_of([&] { rows_of(*open_db3(file), "/a", {{"speed"}}); }), HasSubstr("--msg-path"));
-  write("msgs/mine/msg/Speed.msg", "float64 speed\n");
-  EXPECT_EQ(rows_of(*open_db3(file, {{path("msgs")}}), "/a", {{"speed"}}).values.size(), 3u);
-  EXPECT_THAT(error_of([&] { open_db3(file, {{path("gone")}}); }), HasSubstr("found no folder"));
+  const auto speeds = bag(3, false, "mine/msg/Speed");
+  EXPECT_THAT(error_of([&] { rows_of(*open_db3(speeds), "/a", {{"speed"}}); }), HasSubstr("--msg-path"));
+  put("msgs/mine/msg/Speed.msg", "float64 speed\n");
+  EXPECT_EQ(rows_of(*open_db3(speeds, {{file("msgs")}}), "/a", {{"speed"}}).values.size(), 3u);
+  EXPECT_THAT(error_of([&] { open_db3(speeds, {{file("gone")}}); }), HasSubstr("found no folder"));
 }
 
 TEST_F(Db3LogTest, ACutBagGivesWhatIsBeforeTheCut) {
   const std::string whole = content_of(bag(5000));
-  const Rows rows = rows_of(*open_db3(write("y.db3", whole.substr(0, whole.size() / 2))), "/a", {{"data"}});
+  const Rows rows = rows_of(*open_db3(put("y.db3", whole.substr(0, whole.size() / 2))), "/a", {{"data"}});
   ASSERT_TRUE(rows.damage);
   EXPECT_THAT(rows.damage->what, testing::AllOf(HasSubstr("y.db3: behind message"), HasSubstr(".recover")));
   EXPECT_GT(rows.values.size(), 100u);
@@ -81,7 +81,7 @@ TEST_F(Db3LogTest, OfACutBagPagesAreReadThatNothingLeadsToAnyMore) {
   const std::string whole = content_of(bag(60000));
   for (const double share : {0.3, 0.41234, 0.51317, 0.6, 0.77777, 0.9}) {
     const auto size = static_cast<std::size_t>(share * static_cast<double>(whole.size()));
-    const Rows rows = rows_of(*open_db3(write("y.db3", whole.substr(0, size))), "/a", {{"data"}});
+    const Rows rows = rows_of(*open_db3(put("y.db3", whole.substr(0, size))), "/a", {{"data"}});
     ASSERT_TRUE(rows.damage);
     EXPECT_GT(static_cast<double>(rows.values.size()), (share - 0.01) * 60000.0);
     for (std::size_t i = 0; i < rows.values.size(); ++i) ASSERT_EQ(rows.values[i][0], static_cast<double>(i));
@@ -90,14 +90,14 @@ TEST_F(Db3LogTest, OfACutBagPagesAreReadThatNothingLeadsToAnyMore) {
 
 /// A recorder that is killed leaves a journal, by which SQLite would undo what was written last.
 TEST_F(Db3LogTest, ABagWhoseRecorderWasKilledIsRead) {
-  const auto file = bag(5000);
+  const auto open_bag = bag(5000);
   sqlite3* database = nullptr;
-  sqlite3_open(file.c_str(), &database);
+  sqlite3_open(open_bag.c_str(), &database);
   sqlite3_exec(database, "PRAGMA cache_size=10; BEGIN; UPDATE messages SET timestamp = timestamp + 1", nullptr, nullptr,
                nullptr);
-  const std::filesystem::path killed = path("killed # 1?.db3");
-  std::filesystem::copy_file(file, killed);
-  std::filesystem::copy_file(file.string() + "-journal", killed.string() + "-journal");
+  const std::filesystem::path killed = file("killed # 1?.db3");
+  std::filesystem::copy_file(open_bag, killed);
+  std::filesystem::copy_file(open_bag.string() + "-journal", killed.string() + "-journal");
   sqlite3_close(database);
   const Rows rows = rows_of(*open_db3(killed), "/a", {{"data"}});
   EXPECT_EQ(rows.values.size(), 5000u);
@@ -107,12 +107,12 @@ TEST_F(Db3LogTest, ABagWhoseRecorderWasKilledIsRead) {
 
 TEST_F(Db3LogTest, RefusesDatabasesThatAreNoBags) {
   sqlite3* database = nullptr;
-  sqlite3_open(path("z.db3").c_str(), &database);
+  sqlite3_open(file("z.db3").c_str(), &database);
   sqlite3_exec(database, "CREATE TABLE topics(id); CREATE VIEW messages AS SELECT * FROM topics", nullptr, nullptr,
                nullptr);
   sqlite3_close(database);
-  EXPECT_THAT(error_of([&] { open_db3(path("z.db3")); }), HasSubstr("without the tables 'topics' and 'messages'"));
-  EXPECT_THAT(error_of([&] { open_db3(write("w.db3", "SQLite format 3, but no more")); }), HasSubstr("w.db3"));
+  EXPECT_THAT(error_of([&] { open_db3(file("z.db3")); }), HasSubstr("without the tables 'topics' and 'messages'"));
+  EXPECT_THAT(error_of([&] { open_db3(put("w.db3", "SQLite format 3, but no more")); }), HasSubstr("w.db3"));
 }
 
 }  // namespace db3_log_test

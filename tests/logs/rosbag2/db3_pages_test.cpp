@@ -4,18 +4,17 @@
 #include <sqlite3.h>
 
 #include <cstring>
-
-#include "logs/support/files.hpp"
+#include "support/temporary_folder.hpp"
 
 namespace rhec::logs {
 namespace db3_pages_test {
 
-class Db3PagesTest : public FilesTest {
+class Db3PagesTest : public FolderTest {
  protected:
   /// Rows 1, 2, ... whose data are so many bytes of their number.
   std::filesystem::path table(const std::vector<std::size_t>& sizes, const char* page_size) {
     sqlite3* database = nullptr;
-    sqlite3_open(path("x.db3").c_str(), &database);
+    sqlite3_open(file("x.db3").c_str(), &database);
     sqlite3_exec(database, (std::string("PRAGMA page_size=") + page_size).c_str(), nullptr, nullptr, nullptr);
     sqlite3_exec(database,
                  "CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT, n INTEGER, data BLOB); INSERT INTO topics "
@@ -36,7 +35,7 @@ class Db3PagesTest : public FilesTest {
     sqlite3_finalize(insert);
     sqlite3_exec(database, "COMMIT", nullptr, nullptr, nullptr);
     sqlite3_close(database);
-    return path("x.db3");
+    return file("x.db3");
   }
 };
 
@@ -44,7 +43,7 @@ TEST_F(Db3PagesTest, FindsAllRowsWithoutTheTree) {
   std::vector<std::size_t> sizes;
   for (std::size_t i = 0; i < 3000; ++i) sizes.push_back(i % 100 == 7 ? 20000 + 13 * i : i % 97);
   for (const char* page_size : {"512", "4096", "65536"}) {
-    std::filesystem::remove(path("x.db3"));
+    std::filesystem::remove(file("x.db3"));
     std::size_t count = 0;
     Db3Pages(table(sizes, page_size)).read(0, [&](const Db3Row& row) {
       EXPECT_EQ(row.id, static_cast<std::int64_t>(count) + 1);
@@ -80,7 +79,7 @@ TEST_F(Db3PagesTest, DamagedPagesAreNoHarm) {
       content[noise % content.size()] = static_cast<char>(noise >> 24);
     }
     std::int64_t last = 0, count = 0;
-    Db3Pages(write("y.db3", content)).read(0, [&](const Db3Row& row) {
+    Db3Pages(put("y.db3", content)).read(0, [&](const Db3Row& row) {
       EXPECT_GT(row.id, last);
       last = row.id;
       return ++count < 100000;
@@ -101,7 +100,7 @@ TEST_F(Db3PagesTest, ChainsInCirclesEnd) {
     page[3] = static_cast<char>(number);
   }
   std::size_t long_rows = 0, bytes = 0;
-  Db3Pages(write("y.db3", content)).read(0, [&](const Db3Row& row) {
+  Db3Pages(put("y.db3", content)).read(0, [&](const Db3Row& row) {
     long_rows += row.data.size() == 20000;
     bytes += row.data.size();
     return true;

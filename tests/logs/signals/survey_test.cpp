@@ -3,20 +3,20 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "logs/support/files.hpp"
 #include "rhec/logs/csv/csv_log.hpp"
+#include "support/temporary_folder.hpp"
 
 namespace rhec::logs {
 namespace survey_test {
 
-using SurveyTest = FilesTest;
+using SurveyTest = FolderTest;
 
 TEST_F(SurveyTest, CountsRatesGapsAndRanges) {
   std::string text = "time,speed,label,rare\n";
   for (int i = 0; i < 100; ++i)
     text += std::to_string(i < 50 ? 0.1 * i : 0.1 * i + 7.0) + "," + std::to_string(i) + ",word," +
             (i == 7 ? "3" : "") + "\n";
-  const auto log = open_csv(write("drive.csv", text));
+  const auto log = open_csv(put("drive.csv", text));
   const Survey found = survey(*log);
   ASSERT_EQ(found.topics.size(), 1u);
   const TopicSurvey& table = found.topics.front();
@@ -35,7 +35,7 @@ TEST_F(SurveyTest, CountsRatesGapsAndRanges) {
 }
 
 TEST_F(SurveyTest, TellsDamageAndWhatWasBeforeIt) {
-  const auto log = open_csv(write("drive.csv", "time,speed\n0,1\n1,2\n2\n3,4\n"));
+  const auto log = open_csv(put("drive.csv", "time,speed\n0,1\n1,2\n2\n3,4\n"));
   const Survey found = survey(*log);
   EXPECT_EQ(found.topics.front().count, 2);
   ASSERT_TRUE(found.damage);
@@ -80,7 +80,7 @@ TEST_F(SurveyTest, ABrokenMessageIsItsTopicsAffair) {
 }
 
 TEST_F(SurveyTest, SaysWhyItKnowsNothingOfATopic) {
-  const auto log = open_csv(write("drive.csv", "when,speed\n0,1\n"));
+  const auto log = open_csv(put("drive.csv", "when,speed\n0,1\n"));
   const TopicSurvey found = survey(*log).topics.front();
   EXPECT_THAT(found.unreadable, testing::HasSubstr("no column 'time'"));
   ASSERT_EQ(found.fields.size(), 2u) << "which numbers there are is known, all the same";

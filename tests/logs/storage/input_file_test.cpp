@@ -4,16 +4,16 @@
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
-#include "logs/support/files.hpp"
 #include "support/error_of.hpp"
+#include "support/temporary_folder.hpp"
 
 namespace rhec::logs {
 namespace input_file_test {
 
-using InputFileTest = FilesTest;
+using InputFileTest = FolderTest;
 
 TEST_F(InputFileTest, ReadsFromAnyPlaceAndNotBeyondTheEnd) {
-  InputFile file(write("x", "0123456789"));
+  InputFile file(put("x", "0123456789"));
   std::vector<std::byte> bytes(4);
   ASSERT_TRUE(file.read(bytes));
   EXPECT_TRUE(begins_with(bytes, "0123"));
@@ -27,13 +27,13 @@ TEST_F(InputFileTest, ReadsFromAnyPlaceAndNotBeyondTheEnd) {
 }
 
 TEST_F(InputFileTest, SaysWhyAFileCannotBeRead) {
-  EXPECT_THAT(error_of([&] { InputFile file(path("gone")); }), testing::HasSubstr("No such file"));
-  EXPECT_THAT(error_of([&] { InputFile file(path("")); }), testing::HasSubstr("folder"));
+  EXPECT_THAT(error_of([&] { InputFile one(file("gone")); }), testing::HasSubstr("No such file"));
+  EXPECT_THAT(error_of([&] { InputFile one(file("")); }), testing::HasSubstr("folder"));
 }
 
 // The metadata of a bag may name anything.
 TEST_F(InputFileTest, WaitsForNoPipeAndReadsNoDevice) {
-  const std::filesystem::path pipe = path("pipe");
+  const std::filesystem::path pipe = file("pipe");
   ASSERT_EQ(mkfifo(pipe.c_str(), S_IRUSR | S_IWUSR), 0);
   for (const std::filesystem::path& file : {pipe, std::filesystem::path("/dev/zero")})
     EXPECT_THAT(error_of([&] { InputFile input(file); }),

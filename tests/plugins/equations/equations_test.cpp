@@ -14,6 +14,7 @@
 #include "rhec/core/model/motion_outputs.hpp"
 #include "rhec/core/model/vehicle_graph.hpp"
 #include "support/error_of.hpp"
+#include "support/temporary_folder.hpp"
 
 namespace rhec {
 namespace equations_test {
@@ -25,14 +26,12 @@ const std::string vehicles = RHEC_SOURCE "/examples/vehicles/";
 /// A file that is there for a test.
 class TextFile {
  public:
-  explicit TextFile(const std::string& text) { std::ofstream(path_) << text; }
-  ~TextFile() { std::remove(path_.c_str()); }
-  TextFile(const TextFile&) = delete;
-  TextFile& operator=(const TextFile&) = delete;
+  explicit TextFile(const std::string& text) : path_(folder_.put("written.yaml", text)) {}
   const std::filesystem::path& path() const { return path_; }
 
  private:
-  std::filesystem::path path_ = std::filesystem::path(::testing::TempDir()) / "written.yaml";
+  TemporaryFolder folder_;
+  std::filesystem::path path_;
 };
 
 std::shared_ptr<Model> load(const std::string& text, const std::string& options = "{}") {

@@ -22,6 +22,7 @@
 #include "bicycle/bicycle.hpp"
 #include "odd/odd_2_vehicle.hpp"
 #include "skid_steer/skid_steer.hpp"
+#include "support/temporary_folder.hpp"
 
 namespace rhec {
 namespace vehicle_cpp_test {
@@ -180,11 +181,12 @@ TEST(VehicleCpp, RefusesWhatIsNoVehicle) {
 }
 
 TEST(VehicleCpp, AsksForAnOptionWithoutDefault) {
-  const std::filesystem::path file = std::filesystem::path(::testing::TempDir()) / "needy.yaml";
-  std::ofstream(file) << "options: {mass: {unit: kg, meaning: of it all}}\nstates: {v: {}}\noutputs: {v: {}}\n"
-                         "equations: |\n  v' = v / mass\n";
+  const TemporaryFolder folder;
+  const std::filesystem::path file =
+      folder.put("needy.yaml",
+                 "options: {mass: {unit: kg, meaning: of it all}}\nstates: {v: {}}\noutputs: {v: {}}\n"
+                 "equations: |\n  v' = v / mass\n");
   const VehicleSources sources = vehicle_as_cpp(file);
-  std::remove(file.c_str());
   EXPECT_CONTAINS(content(sources, "needy.hpp"), "Scalar mass{std::numeric_limits<double>::quiet_NaN()};");
   EXPECT_CONTAINS(content(sources, "needy.hpp"), "#include <limits>");
   EXPECT_CONTAINS(content(sources, "needy.cpp"), "if (std::isnan(options.mass))");

@@ -9,6 +9,7 @@
 
 #include "rhec/plugins/yaml/yaml.hpp"
 #include "support/error_of.hpp"
+#include "support/temporary_folder.hpp"
 
 namespace rhec::equations {
 namespace vehicle_file_test {
@@ -37,22 +38,15 @@ equations: |
   x_gps = x
 )";
 
-class VehicleFileTest : public ::testing::Test {
+class VehicleFileTest : public FolderTest {
  protected:
-  const std::filesystem::path file_ = std::filesystem::path(::testing::TempDir()) / "a_vehicle.yaml";
-  ~VehicleFileTest() override { std::remove(file_.c_str()); }
-
-  VehicleFile read(const std::string& text) {
-    std::ofstream(file_) << text;
-    return VehicleFile(file_);
-  }
+  VehicleFile read(const std::string& text) const { return VehicleFile(put("a_vehicle.yaml", text)); }
   /// What is wrong with the good file if `part` of it is another one, without the folder.
   std::string why_not(const std::string& part, const std::string& other) {
     std::string text = good;
     text.replace(text.find(part), part.size(), other);
     const std::string message = error_of([&] { read(text); });
-    const std::string folder = file_.parent_path().string();
-    return message.starts_with(folder) ? message.substr(message.find("a_vehicle")) : message;
+    return message.starts_with(folder_.path().string()) ? message.substr(message.find("a_vehicle")) : message;
   }
 };
 
@@ -131,8 +125,7 @@ TEST_F(VehicleFileTest, MayStandInAnotherFile) {
       end = std::min(vehicle.find('\n', at), vehicle.size());
       text += "    " + vehicle.substr(at, end - at) + "\n";
     }
-    std::ofstream(file_) << text;
-    return load_yaml(file_);
+    return load_yaml(put("a_vehicle.yaml", text));
   };
   const Settings settings = inside(good);
   const VehicleFile vehicle(*settings.find_path("model.equations"));

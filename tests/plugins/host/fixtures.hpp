@@ -8,6 +8,7 @@
 
 #include "rhec/core/base/error.hpp"
 #include "rhec/plugins/host/host.hpp"
+#include "support/temporary_folder.hpp"
 
 // The plugins that tests of the host are made with, and what it says of them.
 namespace rhec {
@@ -30,18 +31,5 @@ inline std::string refusal_of(const std::string& name) {
   const auto records = records_in(fixture(name));
   return records.size() == 1 ? records[0].refusal : "not one file";
 }
-
-class TemporaryFolder {
- public:
-  TemporaryFolder() {
-    std::string pattern = testing::TempDir() + "rhec_host_XXXXXX";
-    path_ = mkdtemp(pattern.data());
-  }
-  ~TemporaryFolder() { fs::remove_all(path_); }
-  const fs::path& path() const { return path_; }
-
- private:
-  fs::path path_;
-};
 
 }  // namespace rhec

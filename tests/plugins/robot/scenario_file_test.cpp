@@ -8,6 +8,7 @@
 
 #include "plugins/robot/robots.hpp"
 #include "support/error_of.hpp"
+#include "support/temporary_folder.hpp"
 
 namespace rhec {
 namespace scenario_file_test {
@@ -15,27 +16,12 @@ namespace scenario_file_test {
 using testing::AllOf;
 using testing::HasSubstr;
 
-class ScenarioFile : public testing::Test {
- protected:
-  void SetUp() override {
-    folder_ = std::filesystem::path(testing::TempDir()) / testing::UnitTest::GetInstance()->current_test_info()->name();
-    std::filesystem::remove_all(folder_);
-    std::filesystem::create_directories(folder_ / "robots");
-  }
-  void TearDown() override { std::filesystem::remove_all(folder_); }
-  std::filesystem::path write(const std::string& name, const std::string& text) const {
-    std::ofstream(folder_ / name) << text;
-    return folder_ / name;
-  }
-
-  std::filesystem::path folder_;
-};
+class ScenarioFile : public FolderTest {};
 
 TEST_F(ScenarioFile, HasTheKeysOfItsRobotWithItsOwnPutOverThem) {
-  write("robots/one.yaml",
-        "step: 0.1\nmodel: {name: bicycle_slip, wheelbase: 2}\nestimator: {horizon: 10, name: ekf}\n");
+  put("robots/one.yaml", "step: 0.1\nmodel: {name: bicycle_slip, wheelbase: 2}\nestimator: {horizon: 10, name: ekf}\n");
   const Settings scenario =
-      load_scenario(write("field.yaml", "robot: robots/one.yaml\nspeed: 3\nestimator: {horizon: 20}\n"));
+      load_scenario(put("field.yaml", "robot: robots/one.yaml\nspeed: 3\nestimator: {horizon: 20}\n"));
   EXPECT_EQ(scenario.find("robot"), nullptr);
   EXPECT_EQ(scenario.find("speed")->as_number(), 3.0);
   EXPECT_EQ(scenario.find("step")->as_number(), 0.1);
@@ -47,28 +33,28 @@ TEST_F(ScenarioFile, HasTheKeysOfItsRobotWithItsOwnPutOverThem) {
 }
 
 TEST_F(ScenarioFile, WithoutARobotIsWhatItIs) {
-  const Settings plain = load_scenario(write("field.yaml", "speed: 3\n"));
+  const Settings plain = load_scenario(put("field.yaml", "speed: 3\n"));
   EXPECT_EQ(plain.members().size(), 1U);
-  EXPECT_THAT(error_of([&] { load_scenario(write("empty.yaml", "")); }), HasSubstr("there is nothing in it"));
+  EXPECT_THAT(error_of([&] { load_scenario(put("empty.yaml", "")); }), HasSubstr("there is nothing in it"));
 }
 
 TEST_F(ScenarioFile, RefusesRobotsThatAreNone) {
   const auto error = [&](const std::string& text) {
-    const auto file = write("field.yaml", text);
+    const auto file = put("field.yaml", text);
     return error_of([&] { load_scenario(file); });
   };
   EXPECT_THAT(error("robot: none.yaml"),
               AllOf(HasSubstr("field.yaml:1: robot: found 'none.yaml'"), HasSubstr("there is no")));
   EXPECT_THAT(error("robot: {name: one}"), HasSubstr("field.yaml:1: robot"));
-  write("list.yaml", "- 1\n");
+  put("list.yaml", "- 1\n");
   EXPECT_THAT(error("robot: list.yaml"), HasSubstr("a robot, which is a map"));
-  write("another.yaml", "robot: field.yaml\n");
+  put("another.yaml", "robot: field.yaml\n");
   EXPECT_THAT(error("robot: another.yaml"), HasSubstr("another.yaml:1: robot"));
 }
 
 TEST_F(ScenarioFile, SaysWhatFilesOfOtherKindsAre) {
   const auto error = [&](const std::string& text) {
-    const auto file = write("field.yaml", text);
+    const auto file = put("field.yaml", text);
     return error_of([&] { load_scenario(file); });
   };
   EXPECT_THAT(error("scenario: x.yaml\ngrid: {speed: [1, 2]}"),

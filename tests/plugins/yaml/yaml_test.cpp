@@ -7,6 +7,7 @@
 #include <fstream>
 
 #include "support/error_of.hpp"
+#include "support/temporary_folder.hpp"
 
 namespace rhec {
 namespace yaml_test {
@@ -114,20 +115,17 @@ TEST(Yaml, AMapThatIsNoConfigurationIsRefusedAtOnce) {
 }
 
 TEST(Yaml, FilesAreNamedInErrors) {
-  const std::filesystem::path folder = std::filesystem::path(testing::TempDir()) / "rhec_yaml_test";
-  std::filesystem::create_directories(folder);
-  const std::filesystem::path file = folder / "run.yaml";
-  std::ofstream(file) << "a: 1\nb: x\n";
+  const TemporaryFolder folder;
+  const std::filesystem::path file = folder.put("run.yaml", "a: 1\nb: x\n");
   const Settings root = load_yaml(file);
   EXPECT_THAT(error_of([&] { root.find("b")->as_number(); }), StartsWith(file.string() + ":2: b: found 'x'"));
   EXPECT_THAT(error_of([&] { load_yaml(folder / "gone.yaml"); }),
               AllOf(HasSubstr("gone.yaml"), HasSubstr("no such file")));
-  EXPECT_THAT(error_of([&] { load_yaml(folder); }), HasSubstr("is a directory"));
+  EXPECT_THAT(error_of([&] { load_yaml(folder.path()); }), HasSubstr("is a directory"));
   for (const char* nothing : {"", "\n\n", "# speed: 4\n", "---\n"}) {
-    std::ofstream(file) << nothing;
+    folder.put("run.yaml", nothing);
     EXPECT_THAT(error_of([&] { load_yaml(file); }), StartsWith(file.string() + ": there is nothing in it")) << nothing;
   }
-  std::filesystem::remove_all(folder);
 }
 
 TEST(Yaml, DevicesHaveAnEnd) {

@@ -10,26 +10,20 @@
 
 #include "rhec/sim/files/csv.hpp"
 #include "support/error_of.hpp"
+#include "support/temporary_folder.hpp"
 
 namespace rhec::sim {
 namespace output_folder_test {
 
 namespace fs = std::filesystem;
 
-class OutputFolderTest : public testing::Test {
+class OutputFolderTest : public FolderTest {
  protected:
-  void SetUp() override {
-    root_ = fs::path(testing::TempDir()) /
-            ("rhec_output_" + std::string(testing::UnitTest::GetInstance()->current_test_info()->name()));
-    fs::remove_all(root_);
-    fs::create_directories(root_);
-  }
-  void TearDown() override { fs::remove_all(root_); }
   static void put(const fs::path& file, const std::string& content) { std::ofstream(file) << content; }
   int entries(const fs::path& folder) const {
     return static_cast<int>(std::distance(fs::directory_iterator(folder), fs::directory_iterator()));
   }
-  fs::path root_;
+  const fs::path root_ = folder_.path();
 };
 
 TEST_F(OutputFolderTest, NothingAppearsBeforeCommit) {

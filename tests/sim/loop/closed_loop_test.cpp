@@ -10,6 +10,7 @@
 #include "rhec/plugins/yaml/yaml.hpp"
 #include "rhec/sim/loop/closed_loop.hpp"
 #include "rhec/sim/loop/run_files.hpp"
+#include "support/temporary_folder.hpp"
 
 namespace rhec::sim {
 namespace closed_loop_test {
@@ -100,8 +101,8 @@ terrain: {name: constant, values: {kappa: 0.87, mu: 1}}
   EXPECT_FALSE(log.completed);
   EXPECT_THAT(log.ended, testing::HasSubstr("takes itself to be at the end of the path, and is "));
   // Nor if the path ends in a stop.
-  const std::string file = testing::TempDir() + "/ends_in_a_stop.csv";
-  std::ofstream(file) << "x,y,speed\n0,0,4\n150,0,4\n300,0,0\n";
+  const TemporaryFolder folder;
+  const std::string file = folder.put("ends_in_a_stop.csv", "x,y,speed\n0,0,4\n150,0,4\n300,0,0\n").string();
   apply_assignment(settings, "path={name: file, file: " + file + "}");
   const RunLog stopped = run_closed_loop({Host(), settings});
   EXPECT_FALSE(stopped.completed);

@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "sim/support/figure8.hpp"
-#include "sim/support/folder_test.hpp"
 #include "support/error_of.hpp"
+#include "support/temporary_folder.hpp"
 
 namespace rhec::sim {
 namespace scenario_test {

@@ -12,6 +12,7 @@
 
 #include "rhec/core/base/error.hpp"
 #include "support/error_of.hpp"
+#include "support/temporary_folder.hpp"
 
 namespace rhec::sim {
 namespace map_export_test {
@@ -47,7 +48,8 @@ TEST(MapExport, AsciiIsEsris) {
 }
 
 TEST(MapExport, GeoTiffHasItsPlaceAndItsFrame) {
-  const std::string file = fmt::format("{}rhec-{}.tif", testing::TempDir(), getpid());
+  const TemporaryFolder folder;
+  const std::string file = folder / "field.tif";
   write_geotiff(file, raster_of(content(), 0, "field.sqlite"), "EPSG:25833");
   TIFF* const tiff = XTIFFOpen(file.c_str(), "r");
   ASSERT_NE(tiff, nullptr);
@@ -73,7 +75,6 @@ TEST(MapExport, GeoTiffHasItsPlaceAndItsFrame) {
   ASSERT_EQ(TIFFReadScanline(tiff, line.data(), 0, 1), 1);
   EXPECT_FLOAT_EQ(line[2], 0.3F);
   XTIFFClose(tiff);
-  std::remove(file.c_str());
 }
 
 TEST(MapExport, RefusesAnEmptyMapAHugeOneAndAFileThatCannotBe) {

@@ -9,6 +9,7 @@
 #include "rhec/plugins/yaml/yaml.hpp"
 #include "rhec/sim/loop/closed_loop.hpp"
 #include "support/error_of.hpp"
+#include "support/temporary_folder.hpp"
 
 namespace rhec::sim {
 namespace map_keeper_test {
@@ -16,14 +17,8 @@ namespace map_keeper_test {
 namespace fs = std::filesystem;
 using testing::HasSubstr;
 
-class MapKeeperTest : public testing::Test {
+class MapKeeperTest : public FolderTest {
  protected:
-  MapKeeperTest() : folder_(fs::path(testing::TempDir()) / fmt::format("rhec-keeper-{}", getpid())) {
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
-  }
-  ~MapKeeperTest() override { fs::remove_all(folder_); }
-
   Scenario scenario(const std::vector<std::string>& more) const {
     Settings settings = load_yaml(SCENARIOS "/second_lap.yaml");
     apply_assignment(settings, "path.laps=1");
@@ -35,8 +30,6 @@ class MapKeeperTest : public testing::Test {
   static RunSummary drive(const Scenario& scenario, const std::shared_ptr<MapKeeper>& keeper) {
     return summarise(run_closed_loop(scenario, {.robot = keeper}), scenario);
   }
-
-  fs::path folder_;
 };
 
 TEST_F(MapKeeperTest, TheSecondDriveKnowsWhatTheFirstOneFound) {

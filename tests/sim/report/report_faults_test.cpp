@@ -9,14 +9,12 @@
 #include "rhec/sim/files/json.hpp"
 #include "rhec/sim/report/report.hpp"
 #include "support/error_of.hpp"
+#include "support/temporary_folder.hpp"
 
 namespace rhec::sim {
 namespace report_faults_test {
 
-struct FaultsReport : ::testing::Test {
-  std::filesystem::path folder =
-      std::filesystem::path(::testing::TempDir()) /
-      (std::string("rhec-faults-report-") + ::testing::UnitTest::GetInstance()->current_test_info()->name());
+struct FaultsReport : FolderTest {
   Json spread{{"median", 3}, {"p99", nullptr}};
   Json measures{{"rides", 7},     {"recovered", spread},   {"ok_again", spread},
                 {"never", 1},     {"unsaid", 0},           {"followed", 0},
@@ -36,12 +34,7 @@ struct FaultsReport : ::testing::Test {
     all["kinds"].push_back(kind);
     return all;
   }
-  std::filesystem::path written(const char* name) {
-    std::filesystem::create_directories(folder);
-    std::ofstream(folder / name) << campaign().dump();
-    return folder / name;
-  }
-  ~FaultsReport() override { std::filesystem::remove_all(folder); }
+  std::filesystem::path written(const char* name) const { return put(name, campaign().dump()); }
 };
 
 TEST_F(FaultsReport, HasTheCampaignAndWhatIsNotReached) {

@@ -10,6 +10,7 @@
 
 #include "rhec/core/base/error.hpp"
 #include "support/error_of.hpp"
+#include "support/temporary_folder.hpp"
 
 namespace rhec::sim {
 namespace slip_map_file_test {
@@ -18,16 +19,8 @@ namespace fs = std::filesystem;
 using testing::AllOf;
 using testing::HasSubstr;
 
-class SlipMapFileTest : public testing::Test {
+class SlipMapFileTest : public FolderTest {
  protected:
-  SlipMapFileTest()
-      : folder_(
-            fs::path(testing::TempDir()) /
-            fmt::format("rhec-map-{}-{}", testing::UnitTest::GetInstance()->current_test_info()->name(), getpid())) {
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
-  }
-  ~SlipMapFileTest() override { fs::remove_all(folder_); }
   fs::path file(const std::string& name = "field.sqlite") const { return folder_ / name; }
 
   static SlipMapContent content() {
@@ -47,8 +40,6 @@ class SlipMapFileTest : public testing::Test {
   std::string reading() const {
     return error_of([this] { read_slip_map(file()); });
   }
-
-  fs::path folder_;
 };
 
 TEST_F(SlipMapFileTest, ComesBackToTheLastBit) {
@@ -72,7 +63,7 @@ TEST_F(SlipMapFileTest, ComesBackToTheLastBit) {
   }
   // Written again it is replaced; nothing is left beside it.
   write_slip_map(file(), content());
-  EXPECT_EQ(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()), 1);
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder_.path()), fs::directory_iterator()), 1);
 }
 
 TEST_F(SlipMapFileTest, RefusesWhatIsNoMap) {
@@ -114,7 +105,7 @@ TEST_F(SlipMapFileTest, RefusesAnotherVersionAndWhatIsDamaged) {
 TEST_F(SlipMapFileTest, KeepsWhatWasThereIfItCannotWrite) {
   write_slip_map(file(), content());
   EXPECT_THAT(error_of([this] { write_slip_map(file() / "map.sqlite", content()); }), HasSubstr("field.sqlite"));
-  EXPECT_THAT(error_of([this] { write_slip_map(folder_, content()); }), HasSubstr("is a folder"));
+  EXPECT_THAT(error_of([this] { write_slip_map(folder_.path(), content()); }), HasSubstr("is a folder"));
   EXPECT_EQ(read_slip_map(file()).cells.size(), 2U);
 }
 

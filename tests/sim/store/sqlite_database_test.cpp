@@ -5,8 +5,8 @@
 #include <limits>
 #include <string>
 
-#include "sim/support/folder_test.hpp"
 #include "support/error_of.hpp"
+#include "support/temporary_folder.hpp"
 
 namespace rhec::sim {
 namespace sqlite_database_test {

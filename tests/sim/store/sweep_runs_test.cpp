@@ -10,8 +10,8 @@
 
 #include "rhec/sim/store/sweep_store.hpp"
 #include "sim/store/sqlite_database.hpp"
-#include "sim/support/folder_test.hpp"
 #include "support/error_of.hpp"
+#include "support/temporary_folder.hpp"
 
 namespace rhec::sim {
 namespace sweep_runs_test {

@@ -10,6 +10,7 @@
 
 #include "rhec/core/base/error.hpp"
 #include "support/error_of.hpp"
+#include "support/temporary_folder.hpp"
 
 namespace rhec::sim {
 namespace sweep_store_test {
@@ -20,17 +21,8 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::StartsWith;
 
-/// A folder that goes with the test.
-class SweepStoreTest : public testing::Test {
+class SweepStoreTest : public FolderTest {
  protected:
-  SweepStoreTest() {
-    const testing::TestInfo& test = *testing::UnitTest::GetInstance()->current_test_info();
-    folder_ = fs::path(testing::TempDir()) / fmt::format("rhec-store-{}-{}", test.name(), getpid());
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
-  }
-  ~SweepStoreTest() override { fs::remove_all(folder_); }
-
   fs::path file(const std::string& name = "runs.sqlite") const { return folder_ / name; }
   /// A database with this many rows.
   fs::path filled(int rows) const {
@@ -71,9 +63,6 @@ class SweepStoreTest : public testing::Test {
     std::ifstream stream(name, std::ios::binary);
     return {std::istreambuf_iterator<char>(stream), {}};
   }
-
- private:
-  fs::path folder_;
 };
 
 /// SQLite itself, beside the store.

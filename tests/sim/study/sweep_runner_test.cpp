@@ -13,6 +13,7 @@
 #include "rhec/plugins/yaml/yaml.hpp"
 #include "rhec/sim/loop/closed_loop.hpp"
 #include "support/address_space.hpp"
+#include "support/temporary_folder.hpp"
 
 namespace rhec::sim {
 namespace sweep_runner_test {
@@ -37,18 +38,9 @@ Sweep small_sweep(const std::string& grid = "") {
                           std::string(SCENARIOS) + "/sweep.yaml"));
 }
 
-class SweepRunnerTest : public testing::Test {
+class SweepRunnerTest : public FolderTest {
  protected:
-  SweepRunnerTest() {
-    const testing::TestInfo& test = *testing::UnitTest::GetInstance()->current_test_info();
-    folder_ = fs::path(testing::TempDir()) / fmt::format("rhec-runner-{}-{}", test.name(), getpid());
-    fs::remove_all(folder_);
-  }
-  ~SweepRunnerTest() override { fs::remove_all(folder_); }
   fs::path file(const std::string& name = "runs.sqlite") const { return folder_ / name; }
-
- private:
-  fs::path folder_;
 };
 
 SweepProgress make(const Sweep& sweep, SweepStore& store, int threads, const SweepHooks& hooks = {}) {

@@ -11,7 +11,7 @@
 #include "rhec/sim/loop/closed_loop.hpp"
 #include "rhec/sim/replay/replay_scenario.hpp"
 #include "rhec/sim/telemetry/measurement_log.hpp"
-#include "sim/support/folder_test.hpp"
+#include "support/temporary_folder.hpp"
 
 namespace rhec::sim {
 

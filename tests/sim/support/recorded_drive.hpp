@@ -9,7 +9,7 @@
 
 #include "rhec/plugins/yaml/yaml.hpp"
 #include "rhec/sim/logs/recorded_log.hpp"
-#include "sim/support/folder_test.hpp"
+#include "support/temporary_folder.hpp"
 
 namespace rhec::sim {
 

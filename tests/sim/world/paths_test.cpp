@@ -12,18 +12,18 @@
 #include "rhec/core/control/path_follower.hpp"
 #include "rhec/sim/numbers/random.hpp"
 #include "support/error_of.hpp"
+#include "support/temporary_folder.hpp"
 
 namespace rhec::sim {
 namespace paths_test {
 
-std::filesystem::path file_with(const std::string& content) {
-  auto file = std::filesystem::path(testing::TempDir()) / "rhec_waypoints.csv";
-  std::ofstream(file) << content;
-  return file;
+auto waypoints_of(const std::string& content, const WaypointFile& defaults = {}) {
+  const TemporaryFolder folder;
+  return load_waypoints(folder.put("waypoints.csv", content), defaults);
 }
 
 std::string message_for(const std::string& content) {
-  return error_of([&] { load_waypoints(file_with(content)); });
+  return error_of([&] { waypoints_of(content); });
 }
 
 // The largest turn of heading per metre along a path [1/m].
@@ -115,7 +115,7 @@ TEST(Headland, TurnsAsAFishtailWhereRowsAreNear) {
 }
 
 TEST(LoadWaypoints, ReadsReverseStopsAndRoom) {
-  const auto waypoints = load_waypoints(file_with("speed,y,x,right\n2,0,0,1.5\n0,0,10,\n-1,0,5,0.5\n"));
+  const auto waypoints = waypoints_of("speed,y,x,right\n2,0,0,1.5\n0,0,10,\n-1,0,5,0.5\n");
   ASSERT_EQ(waypoints.size(), 3u);
   EXPECT_EQ(waypoints[2].x, 5.0);
   EXPECT_EQ(waypoints[2].speed, -1.0);
@@ -125,26 +125,26 @@ TEST(LoadWaypoints, ReadsReverseStopsAndRoom) {
 }
 
 TEST(LoadWaypoints, ReadsWithAndWithoutHeaderAndSpeed) {
-  const auto plain = load_waypoints(file_with("0,0\n1,2\n"), {.speed = 4.0});
+  const auto plain = waypoints_of("0,0\n1,2\n", {.speed = 4.0});
   ASSERT_EQ(plain.size(), 2u);
   EXPECT_EQ(plain[1].y, 2.0);
   EXPECT_EQ(plain[1].speed, 4.0);
-  const auto named = load_waypoints(file_with("x,y,speed\r\n0,0,1.5\r\n1,2,2.5\r\n"));
+  const auto named = waypoints_of("x,y,speed\r\n0,0,1.5\r\n1,2,2.5\r\n");
   ASSERT_EQ(named.size(), 2u);
   EXPECT_EQ(named[1].speed, 2.5);
 }
 
 TEST(LoadWaypoints, NamesTheRowOfAMistake) {
-  EXPECT_CONTAINS(message_for("0,0\n1,2,3\n"), "rhec_waypoints.csv:2: 3 field(s) where 2");
-  EXPECT_CONTAINS(message_for("x,y\n0,0\n1,two\n"), "rhec_waypoints.csv:3: field 2 is 'two'");
-  EXPECT_CONTAINS(message_for("0,0\n1,\n"), "rhec_waypoints.csv:2: a coordinate is missing");
+  EXPECT_CONTAINS(message_for("0,0\n1,2,3\n"), "waypoints.csv:2: 3 field(s) where 2");
+  EXPECT_CONTAINS(message_for("x,y\n0,0\n1,two\n"), "waypoints.csv:3: field 2 is 'two'");
+  EXPECT_CONTAINS(message_for("0,0\n1,\n"), "waypoints.csv:2: a coordinate is missing");
   EXPECT_CONTAINS(message_for("0,0,1\n1,0,-1\n"), "give the waypoint where it does the speed 0");
-  EXPECT_CONTAINS(message_for("0,0,1\n1,0,\n"), "rhec_waypoints.csv:2: the speed is missing");
-  EXPECT_CONTAINS(message_for("x,y\n0,0\n9,0\n1,0.1\n"), "rhec_waypoints.csv:3: path: a vehicle");
-  EXPECT_CONTAINS(message_for("x,y\n0,0\n0,0\n"), "rhec_waypoints.csv: path: 1 distinct waypoint(s)");
+  EXPECT_CONTAINS(message_for("0,0,1\n1,0,\n"), "waypoints.csv:2: the speed is missing");
+  EXPECT_CONTAINS(message_for("x,y\n0,0\n9,0\n1,0.1\n"), "waypoints.csv:3: path: a vehicle");
+  EXPECT_CONTAINS(message_for("x,y\n0,0\n0,0\n"), "waypoints.csv: path: 1 distinct waypoint(s)");
   EXPECT_CONTAINS(message_for("x,z\n0,0\n9,0\n"), "a column 'z'");
   EXPECT_CONTAINS(message_for("x,speed\n0,1\n9,1\n"), "no column 'y'");
-  EXPECT_CONTAINS(message_for("x,y,left\n0,0,1\n9,0,-1\n"), "rhec_waypoints.csv:3: room of -1 m");
+  EXPECT_CONTAINS(message_for("x,y,left\n0,0,1\n9,0,-1\n"), "waypoints.csv:3: room of -1 m");
   EXPECT_CONTAINS(message_for("0\n1\n"), "expected x,y");
   EXPECT_CONTAINS(message_for("x,y\n1,1\n"), "at least 2 rows");
   EXPECT_CONTAINS(message_for(""), "empty");

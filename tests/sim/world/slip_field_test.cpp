@@ -12,15 +12,10 @@
 #include <utility>
 
 #include "support/error_of.hpp"
+#include "support/temporary_folder.hpp"
 
 namespace rhec::sim {
 namespace slip_field_test {
-
-std::filesystem::path file_with(const std::string& content, const std::string& name = "rhec_raster.csv") {
-  const auto file = std::filesystem::path(testing::TempDir()) / name;
-  std::ofstream(file) << content;
-  return file;
-}
 
 TEST(ConstantField, IsTheSameEverywhereOnThePlane) {
   const auto field = constant_field({0.8, 0.9});
@@ -33,7 +28,8 @@ TEST(ConstantField, IsTheSameEverywhereOnThePlane) {
 }
 
 TEST(RasterField, InterpolatesAndGoesOnBeyondTheEdge) {
-  const auto file = file_with("origin_x,origin_y,cell_size\n10,20,2\n0,1,2\n10,11,12\n");
+  const TemporaryFolder folder;
+  const auto file = folder.put("raster.csv", "origin_x,origin_y,cell_size\n10,20,2\n0,1,2\n10,11,12\n");
   const auto smooth = raster_field({.files = {file}});
   const auto stepped = raster_field({.files = {file}, .interpolation = RasterField::Interpolation::nearest});
   const auto at = [](const SlipField& field, double x, double y) {
@@ -53,15 +49,16 @@ TEST(RasterField, InterpolatesAndGoesOnBeyondTheEdge) {
 
 TEST(RasterField, NamesFileAndLineOfAMistake) {
   const auto message_for = [](const std::string& content) {
-    return error_of([&] { raster_field({.files = {file_with(content)}}); });
+    const TemporaryFolder folder;
+    return error_of([&] { raster_field({.files = {folder.put("raster.csv", content)}}); });
   };
   const std::string head = "origin_x,origin_y,cell_size\n0,0,1\n";
-  EXPECT_CONTAINS(message_for(head + "1,2\n1,2,3\n"), "rhec_raster.csv:4: 3 field(s) where 2");
-  EXPECT_CONTAINS(message_for(head + "1,2\n1,x\n"), "rhec_raster.csv:4: field 2 is 'x'");
-  EXPECT_CONTAINS(message_for(head + "1,2\n,2\n"), "rhec_raster.csv:4: field 1 is missing");
-  EXPECT_CONTAINS(message_for("x0,y0,cell\n0,0,1\n1,2\n"), "rhec_raster.csv:1: the names are 'x0,y0,cell'");
-  EXPECT_CONTAINS(message_for("origin_x,origin_y,cell_size\n0,0,0\n1,2\n"), "rhec_raster.csv:2");
-  EXPECT_CONTAINS(message_for("origin_x,origin_y,cell_size\n0,0\n1,2\n"), "rhec_raster.csv:2: 2 field(s) where 3");
+  EXPECT_CONTAINS(message_for(head + "1,2\n1,2,3\n"), "raster.csv:4: 3 field(s) where 2");
+  EXPECT_CONTAINS(message_for(head + "1,2\n1,x\n"), "raster.csv:4: field 2 is 'x'");
+  EXPECT_CONTAINS(message_for(head + "1,2\n,2\n"), "raster.csv:4: field 1 is missing");
+  EXPECT_CONTAINS(message_for("x0,y0,cell\n0,0,1\n1,2\n"), "raster.csv:1: the names are 'x0,y0,cell'");
+  EXPECT_CONTAINS(message_for("origin_x,origin_y,cell_size\n0,0,0\n1,2\n"), "raster.csv:2");
+  EXPECT_CONTAINS(message_for("origin_x,origin_y,cell_size\n0,0\n1,2\n"), "raster.csv:2: 2 field(s) where 3");
   EXPECT_CONTAINS(message_for("origin_x,origin_y,cell_size\n0,0,1\n"), "empty");
   EXPECT_CONTAINS(message_for("1,2\n"), "no values");
   EXPECT_CONTAINS(error_of([] { raster_field({.files = {"no/such/file.csv"}}); }), "no/such/file.csv: cannot be read");

@@ -14,6 +14,7 @@
 #include "problems.hpp"
 #include "solvers/conformance/families.hpp"
 #include "support/limited_ocp.hpp"
+#include "support/temporary_folder.hpp"
 
 namespace rhec::ipopt {
 namespace ipopt_solver_test {
@@ -156,9 +157,8 @@ TEST(Ipopt, WaitingForAnotherSolveCountsForTheDeadline) {
 
 TEST(Ipopt, PrintsNothingAndReadsNoFile) {
   const auto here = std::filesystem::current_path();
-  const auto folder = std::filesystem::temp_directory_path() / ("rhec_ipopt_test_" + std::to_string(::getpid()));
-  std::filesystem::create_directories(folder);
-  std::filesystem::current_path(folder);
+  const TemporaryFolder folder;
+  std::filesystem::current_path(folder.path());
   std::ofstream("ipopt.opt") << "print_level 8\nmax_iter 1\noutput_file told.txt\n";
   ::testing::internal::CaptureStdout();
   ::testing::internal::CaptureStderr();
@@ -183,10 +183,9 @@ TEST(Ipopt, PrintsNothingAndReadsNoFile) {
   EXPECT_EQ(::testing::internal::GetCapturedStdout(), "");
   EXPECT_EQ(::testing::internal::GetCapturedStderr(), "");
   int files = 0;
-  for ([[maybe_unused]] const auto& file : std::filesystem::directory_iterator(folder)) ++files;
+  for ([[maybe_unused]] const auto& file : std::filesystem::directory_iterator(folder.path())) ++files;
   EXPECT_EQ(files, 1) << "besides ipopt.opt";
   std::filesystem::current_path(here);
-  std::filesystem::remove_all(folder);
 }
 
 TEST(Ipopt, AnotherCapacityThanAtSetupIsBadInput) {
