@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "approach.hpp"
 #include "rhec/core/base/angle.hpp"
 #include "rhec/core/base/assertion.hpp"
 #include "rhec/core/base/error.hpp"
@@ -30,6 +31,22 @@ bool is_finite(const Obstacle& it) noexcept {
 
 // A plan that covers less than this share of the path's way, and turns by less than this, is one to stand.
 constexpr double standing_share = 0.1, standing_turn = 0.1;  // [1], [rad]
+// It is so because the vehicle looks away from the path, and not because something is in its way, from this angle on.
+constexpr double away = 0.25 * std::numbers::pi;
+
+// A vehicle turns around on arcs that are wider than the tightest by this factor, so that it can correct what it does;
+// by this factor wider again each time that it has not arrived, up to a limit.
+constexpr double arc_margin = 1.15, wider_again = 1.3, most_margin = 3.0;
+// It does so with no more than this lateral acceleration [m/s^2], so slowly that it turns by no more than this while it
+// steers [rad], and at this share of the path's top speed where the path stops.
+constexpr double turning_acceleration = 1.0, turn_while_steering = 0.5, least_turning_share = 0.3;
+// A vehicle that is lost turns around after it has stood for so long [s].
+constexpr double patience = 5.0;
+// What is not tighter by this share is as tight.
+constexpr double tighter = 1e-3;
+// Of inputs that are tried for it every one is at its least, its straight or its largest value; of more than this many,
+// one at a time.
+constexpr int most_combined_inputs = 4;
 
 /// The problem's state that holds an input whose rate has a weight or bounds, or -1.
 std::vector<int> find_held_states(const Model& model, const Controller::Setup& setup) {
@@ -117,6 +134,7 @@ Controller::Controller(std::shared_ptr<const Model> model, std::shared_ptr<Solve
       held_state_(find_held_states(*vehicle_, setup_)),
       path_(std::move(path)),
       follower_(path_, setup_.search),
+      approach_(std::make_unique<Approach>()),
       problem_(make_problem(vehicle_, setup_, held_state_)),
       solver_(std::move(solver)),
       shifter_(problem_),
@@ -156,6 +174,7 @@ Controller::Controller(std::shared_ptr<const Model> model, std::shared_ptr<Solve
   solver_->setup(problem_);
   const Model& vehicle = *vehicle_;
   command_.inputs.assign(vehicle.input_count(), 0.0);
+  arc_margin_ = arc_margin;
   if (const TermFunctions* terms = problem_.terms().functions(); terms && terms->limit_count() > 0) {
     command_.violations.assign(static_cast<std::size_t>(terms->limit_count()), 0.0);
     limit_values_.assign((static_cast<std::size_t>(N) + 1) * problem_.capacity().limit_row(), 0.0);
@@ -173,11 +192,13 @@ Controller::Controller(std::shared_ptr<const Model> model, std::shared_ptr<Solve
                     vehicle.description().name));
 }
 
+Controller::~Controller() = default;
+
 void Controller::reset() noexcept {
   solver_->reset();
   shifter_.forget();
   follower_.reset();
-  is_located_ = false;
+  locate();
   has_plan_ = prepared_ = false;
   is_finished_ = true;
   fallbacks_ = 0;
@@ -186,7 +207,15 @@ void Controller::reset() noexcept {
   std::fill(last_inputs_.begin(), last_inputs_.end(), std::numeric_limits<double>::quiet_NaN());
 }
 
+void Controller::locate() noexcept {
+  is_located_ = false;
+  approach_->end();
+  arc_margin_ = arc_margin;
+  standing_ = 0.0;
+}
+
 void Controller::locate(double arc_length) noexcept {
+  locate();
   is_located_ = std::isfinite(arc_length);
   if (is_located_) follower_.reset(arc_length);
 }
@@ -288,10 +317,24 @@ void Controller::choose_straight_motion_within_bounds(double ground_speed) noexc
     straight_[nx + j] = std::min(std::max(straight_[nx + j], input_lower(j)), input_upper(j));
 }
 
+/// Where the vehicle is on the path, or on its way back to it.
+double Controller::arc_length() const noexcept {
+  return approach_->is_under_way() ? approach_->arc_length() : follower_.arc_length();
+}
+
+double Controller::arc_length_after(double arc_length, double time, int& segment) const noexcept {
+  return approach_->is_under_way() ? approach_->arc_length_after(arc_length, time)
+                                   : path_.arc_length_after(arc_length, time, segment);
+}
+
+PathPoint Controller::point_at(double arc_length, int& segment) const noexcept {
+  return approach_->is_under_way() ? approach_->point_at(path_, arc_length) : path_.point_at(arc_length, segment);
+}
+
 /// Where the vehicle shall be at each node of a horizon that starts at an arc length.
 void Controller::find_points(double arc_length) noexcept {
   int segment = reference_segment_;
-  points_[0] = path_.point_at(arc_length, segment);
+  points_[0] = point_at(arc_length, segment);
   arc_lengths_[0] = arc_length;
   reference_segment_ = segment;
   points_[0].speed *= pace_;
@@ -303,8 +346,8 @@ void Controller::find_points(double arc_length) noexcept {
     pace += std::min(std::max(wanted_pace_ - pace, -change), change);
     behind += (1.0 - 0.5 * (last + pace)) * setup_.interval;
     segment = reference_segment_;
-    const double there = path_.arc_length_after(arc_length, i * setup_.interval - behind, segment);
-    points_[i] = path_.point_at(there, segment);
+    const double there = arc_length_after(arc_length, i * setup_.interval - behind, segment);
+    points_[i] = point_at(there, segment);
     points_[i].speed *= pace;
     arc_lengths_[i] = there;
   }
@@ -382,13 +425,13 @@ void Controller::write_held_inputs() noexcept {
 void Controller::look_ahead(double arc_length, const double* parameters) noexcept {
   if (!setup_.ahead) return;
   int segment = reference_segment_;
-  const PathPoint start = path_.point_at(arc_length, segment);
+  const PathPoint start = point_at(arc_length, segment);
   const std::array here{start.x, start.y};
   for (int i = 0; i < problem_.intervals(); ++i) {
     // At the middle of the interval, for which the slip holds.
     segment = reference_segment_;
-    const double place = path_.arc_length_after(arc_length, (i + 0.5) * setup_.interval, segment);
-    const PathPoint point = path_.point_at(place, segment);
+    const double place = arc_length_after(arc_length, (i + 0.5) * setup_.interval, segment);
+    const PathPoint point = point_at(place, segment);
     const double way = place - arc_length;
     const std::array there{point.x, point.y};
     setup_.ahead->change(here.data(), there.data(), way, parameters, problem_.interval_data(i));
@@ -433,24 +476,30 @@ void Controller::bound_speed() noexcept {
   }
 }
 
-/// Cold start: the reference inputs, rolled out.
-void Controller::start_cold() noexcept {
+/// Simulates the vehicle with the inputs that `wanted(interval, input)` says, as far as their bounds and those of their
+/// rates let them follow.
+template <class Wanted>
+void Controller::simulate_towards(const Wanted& wanted, Iterate& point) noexcept {
   const int nu = vehicle_->input_count();
-  for (int i = 0; i < problem_.intervals(); ++i)
-    std::copy_n(problem_.input_reference(i), nu, scratch_.data() + static_cast<std::ptrdiff_t>(i) * nu);
   for (int j = 0; j < nu; ++j) {
-    if (held_state_[j] < 0) continue;
-    double held = problem_.given_state()[held_state_[j]];
+    double held = held_state_[j] < 0 ? 0.0 : problem_.given_state()[held_state_[j]];
     for (int i = 0; i < problem_.intervals(); ++i) {
-      const double dt = problem_.duration(i), wanted = (input_reference(i, j) - held) / dt;
-      double& rate = scratch_[static_cast<std::size_t>(i) * nu + j];
-      rate = std::min(std::max(wanted, problem_.input_lower(i, j)), problem_.input_upper(i, j));
-      held += dt * rate;
+      double& input = scratch_[static_cast<std::size_t>(i) * nu + j];
+      input = wanted(i, j);
+      if (held_state_[j] < 0) continue;
+      const double dt = problem_.duration(i), rate = (input - held) / dt;
+      input = std::min(std::max(rate, problem_.input_lower(i, j)), problem_.input_upper(i, j));
+      held += dt * input;
     }
   }
-  problem_.structure().set_decisions(point_, scratch_.data(), problem_.given_parameters());
-  point_.clear_multipliers();
-  roll_out(problem_, point_, scratch_);
+  problem_.structure().set_decisions(point, scratch_.data(), problem_.given_parameters());
+  point.clear_multipliers();
+  roll_out(problem_, point, scratch_);
+}
+
+/// Cold start: the reference inputs, rolled out.
+void Controller::start_cold() noexcept {
+  simulate_towards([this](int i, int j) { return input_reference(i, j); }, point_);
 }
 
 /// Calls the solver and takes the command from its plan. False if there is no usable plan.
@@ -489,6 +538,12 @@ void Controller::keep_within_bounds() noexcept {
 void Controller::find_place(const Estimate& estimate) noexcept {
   const Roles& roles = vehicle_->description().roles;
   const double x = estimate.state[roles.position_x], y = estimate.state[roles.position_y];
+  if (approach_->is_under_way()) {
+    approach_->advance(x, y, estimate.state[roles.heading]);
+    if (approach_->is_under_way()) return;
+    if (approach_->has_arrived()) follower_.reset(approach_->target());
+    arc_margin_ = approach_->has_arrived() ? arc_margin : std::min(arc_margin_ * wider_again, most_margin);
+  }
   if (!is_located_ && std::isfinite(x) && std::isfinite(y)) {
     double heading = std::numeric_limits<double>::quiet_NaN();
     if (roles.heading >= 0 && std::isfinite(estimate.state[roles.heading])) {
@@ -509,10 +564,10 @@ const Controller::Command& Controller::control(const Estimate& estimate, Clock::
   std::copy_n(estimate.state.data(), nx, problem_.given_state());
   std::copy_n(estimate.parameters.data(), np, problem_.given_parameters());
   // What is prepared is linearised with the slip that was expected then.
-  if (!prepared_) look_ahead(follower_.arc_length(), estimate.parameters.data());
+  if (!prepared_) look_ahead(arc_length(), estimate.parameters.data());
   now_ = estimate.time;
   choose_pace(estimate.health);
-  set_reference(follower_.arc_length(), estimate.parameters.data(), now_);
+  set_reference(arc_length(), estimate.parameters.data(), now_);
   const int heading = vehicle_->description().roles.heading;
   command_.heading_error = heading >= 0 ? angle_difference(estimate.state[heading], command_.reference.heading) : 0.0;
   write_held_inputs();
@@ -560,7 +615,11 @@ const Controller::Command& Controller::control(const Estimate& estimate, Clock::
     }
     plan_inputs(0, command_.inputs.data());
   }
-  command_.faces_away = faces_away();
+  command_.turns_around = approach_->is_under_way();
+  standing_ = faces_away() ? standing_ + setup_.interval : 0.0;
+  // Who does not know where the vehicle heads will know better soon, mostly; if not, it is motion that tells.
+  const bool may_turn = standing_ > (estimate.health.level == HealthLevel::lost ? patience : 0.0);
+  command_.faces_away = standing_ > 0.0 && !(may_turn && turn_around(estimate));
   keep_within_bounds();
   RHEC_ASSERT(all_finite(command_.inputs), "a command is finite");
   is_finished_ = false;
@@ -570,13 +629,63 @@ const Controller::Command& Controller::control(const Estimate& estimate, Clock::
 /// Whether a plan neither moves nor turns a vehicle that looks the other way.
 bool Controller::faces_away() const noexcept {
   const Roles& roles = vehicle_->description().roles;
-  if (roles.heading < 0 || !(std::abs(command_.heading_error) > 0.5 * std::numbers::pi)) return false;
+  if (roles.heading < 0 || !(std::abs(command_.heading_error) > away)) return false;
   const int N = problem_.intervals();
   const double *from = point_.state(0), *to = point_.state(N);
   const double way =
       std::hypot(to[roles.position_x] - from[roles.position_x], to[roles.position_y] - from[roles.position_y]);
   const double wanted = arc_lengths_[static_cast<std::size_t>(N)] - arc_lengths_[0];
   return way < standing_share * wanted && std::abs(to[roles.heading] - from[roles.heading]) < standing_turn;
+}
+
+/// Begins a way back to the path, as tight as the vehicle can turn, from the next sample on. False: there is none.
+bool Controller::turn_around(const Estimate& estimate) noexcept {
+  if (!setup_.turns_around) return false;
+  const Roles& roles = vehicle_->description().roles;
+  const double section_speed = std::abs(path_.point_at(follower_.arc_length()).speed);
+  const double speed = std::max(section_speed, least_turning_share * path_.top_speed());
+  const double sense = points_[0].in_reverse ? -1.0 : 1.0;
+  const int nu = vehicle_->input_count();
+  int trials = 1;
+  for (int j = 0; j < nu; ++j) trials = nu > most_combined_inputs ? trials + 2 : trials * 3;
+  Approach::Turn best{.radius = infinity};
+  for (int trial = 1; trial < trials; ++trial) {
+    const auto extreme = [&](int i, int input) {
+      int choice = 0;
+      if (nu > most_combined_inputs) {
+        choice = (trial + 1) / 2 == input + 1 ? 1 + trial % 2 : 0;
+      } else {
+        choice = trial;
+        for (int j = 0; j < input; ++j) choice /= 3;
+        choice %= 3;
+      }
+      return choice == 0 ? input_reference(i, input) : choice == 1 ? input_lower(input) : input_upper(input);
+    };
+    simulate_towards(extreme, relaxed_plan_);
+    double time = 0.0;
+    for (int i = 0; i < problem_.intervals(); ++i) {
+      const double *from = relaxed_plan_.state(i), *to = relaxed_plan_.state(i + 1), dt = problem_.duration(i);
+      bool is_within = true;
+      for (int k = 0; k < problem_.state_count(i + 1); ++k)
+        is_within = is_within && to[k] >= problem_.state_lower(i + 1)[k] && to[k] <= problem_.state_upper(i + 1)[k];
+      if (!is_within) break;
+      time += dt;
+      const double turn = std::abs(to[roles.heading] - from[roles.heading]);
+      const double middle = 0.5 * (to[roles.heading] + from[roles.heading]);
+      const double way = sense * (std::cos(middle) * (to[roles.position_x] - from[roles.position_x]) +
+                                  std::sin(middle) * (to[roles.position_y] - from[roles.position_y]));
+      if (!(turn > 0.0) || !(way >= 0.0)) continue;
+      const double radius = std::max(arc_margin_ * way / turn, speed * dt);
+      if (!(radius < (1.0 - tighter) * best.radius)) continue;
+      best = {radius, std::min({speed, radius * turn / dt / arc_margin, std::sqrt(turning_acceleration * radius),
+                                turn_while_steering * radius / time})};
+    }
+  }
+  const Pose here{estimate.state[roles.position_x], estimate.state[roles.position_y], estimate.state[roles.heading]};
+  if (!approach_->begin(path_, follower_.section(), follower_.arc_length(), here, best)) return false;
+  // The plan is one to stand.
+  has_plan_ = false;
+  return true;
 }
 
 /// Work that the robot need not wait for: assess and keep the plan before the problem changes to the next sample.
@@ -631,7 +740,7 @@ void Controller::prepare() noexcept {
   std::copy_n(problem_.given_parameters(), np, reference_parameters_.data());
   const PathPoint reference = command_.reference;
   int segment = reference_segment_;
-  const double next = path_.arc_length_after(follower_.arc_length(), setup_.interval, segment);
+  const double next = arc_length_after(arc_length(), setup_.interval, segment);
   look_ahead(next, reference_parameters_.data());
   set_reference(next, reference_parameters_.data(), now_ + setup_.interval);
   command_.reference = reference;

@@ -155,6 +155,9 @@ const OptionTable<ControllerOptions>& ControllerOptions::table() {
                   "a wheel speed that is an input is at most this times the reference plus speed_bound_offset",
                   or_infinite(at_least(0.0)))
           .number("speed_bound_offset", &C::speed_bound_offset, "[m/s]", or_infinite(at_least(0.0)))
+          .flag("turn_around", &C::turn_around,
+                "a vehicle that looks away from the path, and that no plan turns, drives a way back to it; without "
+                "this it stands until somebody turns it")
           .map("weights", &C::weights, WeightOptions::table().schema())
           .map("rate_bounds", &C::rate_bounds, rate_bounds_by_name().rows())
           .group("health", &C::health, PaceOptions::table())
@@ -286,6 +289,7 @@ std::unique_ptr<Controller> ControllerSection::make(const Path& path, const Robo
     setup.least_speed_factor = options_.least_speed_factor;
     setup.speed_bound_factor = options_.speed_bound_factor;
     setup.speed_bound_offset = options_.speed_bound_offset;
+    setup.turns_around = options_.turn_around;
     setup.ahead = ahead;
     add_blockings(setup, intervals);
     add_terms(setup);

@@ -194,6 +194,9 @@ void bind_commands(py::module_& module) {
           "faces_away", [](const CommandObject& self) { return self.value.faces_away; },
           "the vehicle faces away from the path, and stands until somebody turns it")
       .def_property_readonly(
+          "turns_around", [](const CommandObject& self) { return self.value.turns_around; },
+          "the vehicle drives a way back to the path, from which it has looked away")
+      .def_property_readonly(
           "pace", [](const CommandObject& self) { return self.value.pace; },
           "share of the path's speeds that is driven at present")
       .def_property_readonly(

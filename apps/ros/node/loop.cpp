@@ -83,6 +83,8 @@ const char* in_words(Driving driving) noexcept {
       return "estimates, does not steer";
     case Driving::facing_away:
       return "stands: the path leads away behind the vehicle; turn it, or begin the path with a turn";
+    case Driving::turning_around:
+      return "turns around: the path leads away behind the vehicle";
     case Driving::driving:
       break;
   }
@@ -395,6 +397,8 @@ void Loop::cycle() {
       command = nullptr;
     } else if (command->faces_away) {
       driving = Driving::facing_away;
+    } else if (command->turns_around) {
+      driving = Driving::turning_around;
     }
   }
   const Clock::time_point controlled = Clock::now();

@@ -25,15 +25,16 @@ namespace rhec::apps::ros {
 
 /// Whether the robot is moved, and why not.
 enum class Driving : std::uint8_t {
-  clock,        ///< waits for the time on /clock, or it stands still
-  waiting,      ///< for measurements
-  heading,      ///< for a heading that is known, which takes motion by somebody else
-  no_path,      ///< nobody has said where to go
-  stopped,      ///< the stop topic says so
-  silent,       ///< no measurement came for too long
-  finished,     ///< the end of the path is reached
-  estimating,   ///< this node does not steer
-  facing_away,  ///< the path leads away behind the vehicle, and it stands
+  clock,           ///< waits for the time on /clock, or it stands still
+  waiting,         ///< for measurements
+  heading,         ///< for a heading that is known, which takes motion by somebody else
+  no_path,         ///< nobody has said where to go
+  stopped,         ///< the stop topic says so
+  silent,          ///< no measurement came for too long
+  finished,        ///< the end of the path is reached
+  estimating,      ///< this node does not steer
+  facing_away,     ///< the path leads away behind the vehicle, and it stands
+  turning_around,  ///< the same, and it drives a way back to the path
   driving
 };
 const char* in_words(Driving driving) noexcept;

@@ -253,11 +253,14 @@ TEST(ControllerReference, StartsOnTheLapThatItIsTold) {
 /// Follows the diagonal for so many samples from its tenth metre, looking off the path by an angle, without slip.
 struct Turned {
   bool ever = false, now = false;  ///< facing away, by what the commands say
-  double way = 0.0;                ///< along the path [m]
+  int turning = 0;                 ///< samples in which it turns around, by what the commands say
+  double way = 0.0, beside = 0.0;  ///< along the path, and at the end to its left [m]
+  double farthest = 0.0;           ///< from the path [m]
+  double heading_error = 0.0;      ///< at the end [rad]
 };
 Turned turned(const std::string& configuration, double angle, int samples) {
   const auto controller = controller_for(configuration);
-  const Model& model = controller->problem().model();
+  const Model& model = controller->vehicle();
   const std::vector<double> slip = nominal_values(model.description().parameters);
   const Roles& roles = model.description().roles;
   Estimate estimate;
@@ -270,6 +273,7 @@ Turned turned(const std::string& configuration, double angle, int samples) {
     const Controller::Command& command = controller->control(estimate);
     told.now = command.faces_away;
     told.ever |= told.now;
+    told.turning += command.turns_around;
     Eigen::VectorXd next(model.state_count());
     model.integrate({.count = 1,
                      .states = estimate.state.data(),
@@ -280,13 +284,16 @@ Turned turned(const std::string& configuration, double angle, int samples) {
     estimate.state = next;
     estimate.time += step;
     controller->prepare();
+    told.beside = (estimate.state[roles.position_y] - estimate.state[roles.position_x]) / std::numbers::sqrt2;
+    told.farthest = std::max(told.farthest, std::abs(told.beside));
   }
+  told.heading_error = std::remainder(estimate.state[roles.heading] - 0.25 * std::numbers::pi, 2.0 * std::numbers::pi);
   told.way = (estimate.state[roles.position_x] + estimate.state[roles.position_y]) / std::numbers::sqrt2 - 10.0;
   return told;
 }
 
 TEST(ControllerHeading, ThatIsAwayFromThePathIsTold) {
-  const char* const bicycle = "model: bicycle_slip";
+  const char* const bicycle = "{model: bicycle_slip, controller: {turn_around: false}}";
   for (const double angle : {std::numbers::pi, 3.0, -2.8}) {
     const Turned away = turned(bicycle, angle, 50);
     EXPECT_TRUE(away.now) << angle;
@@ -307,6 +314,25 @@ TEST(ControllerHeading, ThatIsAwayFromThePathIsTold) {
   estimate.state[2] = 0.0;
   reverse->locate();
   EXPECT_TRUE(reverse->control(estimate).faces_away);
+}
+
+TEST(ControllerHeading, AVehicleThatLooksAwayTurnsAround) {
+  for (const char* const vehicle :
+       {"model: bicycle_slip", "model: skid_steer", "model: tractor_trailer",
+        "{model: bicycle_slip, controller: {rate_bounds: {u2: [-0.5, 0.5]}}}",
+        "{model: bicycle_slip, controller: {weights: {stage: {u1: 5, u2: 5}, rates: {u1: 1, u2: 1}}}}"}) {
+    for (const double angle : {std::numbers::pi, 2.8, -2.9}) {
+      const Turned about = turned(vehicle, angle, 200);
+      EXPECT_FALSE(about.ever) << vehicle << " " << angle;
+      EXPECT_LT(about.turning, 130) << vehicle << " " << angle;
+      EXPECT_LT(about.farthest, 7.0) << vehicle << " " << angle;
+      EXPECT_LT(std::abs(about.beside), 0.01) << vehicle << " " << angle;
+      EXPECT_LT(std::abs(about.heading_error), 0.01) << vehicle << " " << angle;
+      EXPECT_GT(about.way, 30.0) << vehicle << " " << angle;
+    }
+    // One that looks back exactly cannot turn by itself.
+    EXPECT_GT(turned(vehicle, std::numbers::pi, 30).turning, 15) << vehicle;
+  }
 }
 
 TEST(ControllerReference, RefusesAPathThatNoVehicleCanFollow) {

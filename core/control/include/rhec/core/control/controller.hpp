@@ -16,6 +16,8 @@
 
 namespace rhec {
 
+class Approach;
+
 enum class ReferenceSpeed {
   ground,  ///< the path's speed is over ground: the wheels turn faster by the estimated slip
   literal  ///< the path's speed is the wheels' speed (as in the paper; under slip the vehicle lags and cuts corners)
@@ -35,6 +37,9 @@ enum class ReferenceSpeed {
 /// problem is then that of an InputRateModel. Before the first command u_{-1} is what drives straight ahead, unless
 /// `applied` has said what it is.
 ///
+/// A vehicle that looks away from the path, and that no plan within the horizon turns, goes round: its reference is the
+/// shortest way back to the path by arcs that it can drive, as its model says, until it is there (docs/paths.md).
+///
 /// Terms of the problem (RhcProblem::Setup) get the reference of each node, and the obstacles of `set_obstacles`.
 /// Allocates in its constructor only.
 class RHEC_EXPORT Controller {
@@ -52,6 +57,7 @@ class RHEC_EXPORT Controller {
     std::vector<double> rate_weights;                        ///< n_u, of squared rates; empty: 0
     std::vector<double> rate_lower, rate_upper;  ///< n_u, bounds of rates [unit of the input / s]; empty: none
     PathFollower::Window search;
+    bool turns_around = true;  ///< drives a way back to a path that it looks away from; false: it stands
     /// Share of the path's speeds while an estimate's health is not `ok`. It changes over time, so that the vehicle
     /// slows, stops on the path, and starts again. A heading is not found without motion: while it is searched for the
     /// first time all is as with `ok`, and later, where the place is known (reason::heading), the share is `heading`.
@@ -67,6 +73,7 @@ class RHEC_EXPORT Controller {
   Controller(std::shared_ptr<const Model> model, std::shared_ptr<Solver> solver, Path path, Setup setup);
   Controller(const Controller&) = delete;  // the follower points into the path
   Controller& operator=(const Controller&) = delete;
+  ~Controller();
 
   struct Command {
     std::vector<double> inputs;  ///< u_k, n_u: to be applied until the next call
@@ -76,9 +83,10 @@ class RHEC_EXPORT Controller {
     double heading_error = 0.0;  ///< heading of the estimate - that of the reference, in (-pi, pi] [rad]
     bool relaxed = false;        ///< a state bound was out of reach from the estimate and was relaxed
     double pace = 1.0;           ///< share of the path's speeds that is driven at present
-    /// The vehicle faces away from the path, and its plan is to stand: no way round is worth it within the horizon, so
-    /// that it stays there until somebody turns it, or the path is another.
+    /// The vehicle faces away from the path, and its plan is to stand. It does not turn around either, since it shall
+    /// not, cannot, or has no room to: it stays there until somebody turns it, or the path is another.
     bool faces_away = false;
+    bool turns_around = false;  ///< the reference is a way back to the path, which the vehicle has looked away from
     /// By limit of the terms (TermFunctions::limit_names), how far what follows next is beyond it: the plan's first
     /// interval and the node at its end; 0: it is kept. Of this sample from `finish` on.
     std::vector<double> violations;
@@ -92,7 +100,7 @@ class RHEC_EXPORT Controller {
   /// it was driven by hand. Matters to rates alone. NaN: the last command, or what drives straight ahead.
   void applied(const double* inputs) noexcept;
   /// Searches the whole path for the vehicle at the next call, as at the first one.
-  void locate() noexcept { is_located_ = false; }
+  void locate() noexcept;
   /// Says where on the path the vehicle is [m], where that is known: a path may pass the same place more than once, as
   /// laps do. The next call searches near it. A number that is not finite asks for the search of the whole path.
   void locate(double arc_length) noexcept;
@@ -139,17 +147,24 @@ class RHEC_EXPORT Controller {
   double distance_from_plan(const Obstacle& obstacle) const noexcept;
   void measure_violations() noexcept;
   bool faces_away() const noexcept;
+  double arc_length() const noexcept;
+  double arc_length_after(double arc_length, double time, int& segment) const noexcept;
+  PathPoint point_at(double arc_length, int& segment) const noexcept;
+  template <class Wanted>
+  void simulate_towards(const Wanted& wanted, Iterate& point) noexcept;
+  bool turn_around(const Estimate& estimate) noexcept;
 
   Setup setup_;
   std::shared_ptr<const Model> vehicle_;
   std::vector<int> held_state_;  ///< n_u: the problem's state that holds an input, or -1
   Path path_;
   PathFollower follower_;
+  std::unique_ptr<Approach> approach_;  ///< to the path, while the vehicle turns around
   RhcProblem problem_;
   std::shared_ptr<Solver> solver_;
   GuessShifter shifter_;
   Iterate point_;
-  Iterate relaxed_plan_;  ///< that violates hard limits least, while another one is looked for
+  Iterate relaxed_plan_;  ///< that violates hard limits least, while another one is looked for; or a trial of inputs
   Report relaxed_report_;
   Command command_;
   bool has_plan_ = false, prepared_ = false;
@@ -170,6 +185,8 @@ class RHEC_EXPORT Controller {
   std::vector<double> obstacle_distances_;  ///< of these from the plan [m]
   std::size_t obstacle_count_ = 0;
   double pace_ = 1.0, wanted_pace_ = 1.0;  ///< share of the path's speeds
+  double standing_ = 0.0;                  ///< for how long its plan has been to stand, looking away [s]
+  double arc_margin_ = 1.0;                ///< of arcs to turn around on, over the tightest
   double seen_ = 0.0;                      ///< when these were there [s]
   double now_ = 0.0;                       ///< time of the last estimate [s]
 };

@@ -31,6 +31,7 @@ struct RHEC_EXPORT ControllerOptions {
   double least_speed_factor = Controller::Setup{}.least_speed_factor;
   double speed_bound_factor = Controller::Setup{}.speed_bound_factor;
   double speed_bound_offset = Controller::Setup{}.speed_bound_offset;
+  bool turn_around = Controller::Setup{}.turns_around;
   PaceOptions health;
   Settings weights, rate_bounds, terms, blocking, solver;
   static const OptionTable<ControllerOptions>& table();

@@ -1,0 +1,117 @@
+#include "approach.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "rhec/core/base/angle.hpp"
+
+namespace rhec {
+namespace {
+
+// How far along the path the approach may end, and in what steps this is tried, in radii.
+constexpr double most_ahead = 8.0, ahead_step = 0.5;
+// Room beside the path is looked at in steps of this many radii. Rounding is no lack of it [m].
+constexpr double room_step = 0.25, room_rounding = 1e-6;
+// The vehicle's place is looked for this far ahead, in so many steps: never on another arc that passes it [radii].
+constexpr double search_window = 1.0;
+constexpr int search_steps = 32;
+// A vehicle that looks away from its way by more than this [rad], or is farther from it than this [radii], has left it.
+constexpr double most_off = 0.5 * std::numbers::pi, most_beside = 2.0;
+
+}  // namespace
+
+bool Approach::begin(const Path& path, int section, double arc_length, const Pose& vehicle, const Turn& turn) noexcept {
+  is_under_way_ = false;
+  if (!(turn.radius > 0.0) || !(turn.speed > 0.0) || !std::isfinite(turn.radius)) return false;
+  if (!std::isfinite(vehicle.x) || !std::isfinite(vehicle.y) || !std::isfinite(vehicle.direction)) return false;
+  const double end = path.section_end(section);
+  const double start = std::min(std::max(arc_length, path.section_start(section)), end);
+  const Approach before = *this;
+  turn_ = turn;
+  DubinsPath best;
+  double least = HUGE_VAL, target = 0.0;
+  for (double ahead = 0.0; ahead <= most_ahead; ahead += ahead_step) {
+    target_ = start + ahead * turn.radius;
+    if (target_ > end) break;
+    const PathPoint there = path.point_at(target_);
+    const double turned = there.in_reverse ? std::numbers::pi : 0.0;
+    for (const DubinsPath::Kind& kind : DubinsPath::kinds) {
+      way_ = DubinsPath(kind, {vehicle.x, vehicle.y, vehicle.direction + turned},
+                        {there.x, there.y, there.heading + turned}, turn.radius);
+      const double cost = way_.length() + target_ - start;
+      if (!way_.exists() || !(cost < least)) continue;
+      if (!has_room(path, path.section_start(section), end)) continue;
+      least = cost;
+      best = way_;
+      target = target_;
+      in_reverse_ = there.in_reverse;
+    }
+  }
+  if (!best.exists()) {
+    *this = before;
+    return false;
+  }
+  way_ = best;
+  target_ = target;
+  last_ = end;
+  done_ = 0.0;
+  is_under_way_ = true;
+  return true;
+}
+
+/// Whether the way is nowhere further beyond the room of a part of the path than at its start.
+bool Approach::has_room(const Path& path, double from, double to) const noexcept {
+  const double reach = way_.length() + turn_.radius;
+  from = std::max(from, target_ - reach);
+  to = std::max(from, std::min(to, target_ + reach));
+  double allowed = room_rounding;
+  for (double along = 0.0; along <= way_.length(); along += room_step * turn_.radius) {
+    const Pose place = way_.pose_at(along);
+    const PathProjection beside = path.closest(place.x, place.y, from, to);
+    const PathPoint point = path.point_at(beside.arc_length);
+    const double beyond = std::max(beside.lateral - point.left, -beside.lateral - point.right);
+    if (along == 0.0) allowed = std::max(beyond, 0.0) + room_rounding;
+    if (beyond > allowed) return false;
+  }
+  return true;
+}
+
+void Approach::advance(double x, double y, double heading) noexcept {
+  if (!is_under_way_ || !std::isfinite(x) || !std::isfinite(y)) return;
+  double nearest = done_, least = HUGE_VAL;
+  for (int i = 0; i <= search_steps; ++i) {
+    const double along = done_ + i * search_window * turn_.radius / search_steps;
+    const Pose there = way_.pose_at(along);
+    const double distance = std::hypot(x - there.x, y - there.y);
+    if (distance >= least) continue;
+    least = distance;
+    nearest = along;
+  }
+  done_ = nearest;
+  const double direction = heading + (in_reverse_ ? std::numbers::pi : 0.0);
+  const double off = std::abs(angle_difference(direction, way_.pose_at(done_).direction));
+  is_under_way_ = !has_arrived() && off < most_off && least < most_beside * turn_.radius;
+}
+
+double Approach::arc_length_after(double arc_length, double time) const noexcept {
+  return std::min(arc_length + time * turn_.speed, std::max(arc_length, last_));
+}
+
+PathPoint Approach::point_at(const Path& path, double arc_length) const noexcept {
+  const double along = arc_length - target_ + way_.length();
+  PathPoint point = path.point_at(std::max(arc_length, target_));
+  point.speed = in_reverse_ ? -turn_.speed : turn_.speed;
+  if (arc_length >= target_) return point;
+  const Pose pose = way_.pose_at(along);
+  point.x = pose.x;
+  point.y = pose.y;
+  point.heading = std::remainder(pose.direction - (in_reverse_ ? std::numbers::pi : 0.0), 2.0 * std::numbers::pi);
+  point.curvature = way_.curvature_at(along);
+  point.in_reverse = in_reverse_;
+  // Which the way has been found to keep to; it is that beside the path, not beside this way.
+  point.left = point.right = infinity;
+  return point;
+}
+
+}  // namespace rhec

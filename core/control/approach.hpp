@@ -1,0 +1,48 @@
+#pragma once
+
+#include "dubins_path.hpp"
+#include "rhec/core/control/path.hpp"
+
+namespace rhec {
+
+/// The way back to a path for a vehicle that looks away from it. It is a DubinsPath with arcs that the vehicle can
+/// drive, to that place further on where this way and the part of the path that is left out are shortest together. It
+/// is driven at one speed, in the direction of the path there: in reverse where the path is.
+///
+/// Its places are counted as if it were the end of the path: the arc length at its end is that of the path there, and
+/// from there on it is the path. Neither allocates nor throws.
+class Approach {
+ public:
+  /// How a vehicle turns.
+  struct Turn {
+    double radius = 0.0;  ///< [m], of arcs that it can drive
+    double speed = 0.0;   ///< [m/s], at which it does
+  };
+
+  /// Begins where the vehicle is, with its heading, to the path at an arc length or further on in that section. Where
+  /// the path has room beside it, the way keeps to it as far as the vehicle does now. False: there is no such way.
+  bool begin(const Path& path, int section, double arc_length, const Pose& vehicle, const Turn& turn) noexcept;
+  void end() noexcept { is_under_way_ = false; }
+  bool is_under_way() const noexcept { return is_under_way_; }
+
+  /// Moves on with the vehicle. The approach has ended if it has arrived at its end, or is not on its way any more: it
+  /// looks away from that, too, or is elsewhere, as where an estimate has jumped.
+  void advance(double x, double y, double heading) noexcept;
+  bool has_arrived() const noexcept { return done_ >= way_.length(); }
+  /// Where the vehicle is, and where the approach ends [m].
+  double arc_length() const noexcept { return target_ - way_.length() + done_; }
+  double target() const noexcept { return target_; }
+  double arc_length_after(double arc_length, double time) const noexcept;
+  PathPoint point_at(const Path& path, double arc_length) const noexcept;
+
+ private:
+  bool has_room(const Path& path, double from, double to) const noexcept;
+
+  DubinsPath way_;
+  Turn turn_;
+  double target_ = 0.0, done_ = 0.0, last_ = 0.0;  ///< [m]; the last one is the end of the section
+  bool in_reverse_ = false;
+  bool is_under_way_ = false;
+};
+
+}  // namespace rhec
