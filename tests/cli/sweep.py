@@ -152,27 +152,27 @@ class Test(cli.Findings):
         self.expect(not (self.work / f"runs-{self.files}.sqlite").exists(), "asked", "made a database")
         for answer, words in (("y\n", []), ("", ["--yes"])):
             out = self.out()
-            shown, code = self.on_terminal(answer, "sweep", many, "--out", out, *words, seconds=1.5)
+            shown, code = self.on_terminal(answer, "sweep", many, "--out", out, *words, until=LINE)
             self.expect(code == NOT_SOLVED and len(self.rows(out)) > 0, "begun", f"{code}: {shown}")
 
-    def on_terminal(self, answer, *words, seconds=None):
-        """What is shown on a terminal, and the exit code; ended by Ctrl-C after a while."""
+    def on_terminal(self, answer, *words, until=None):
+        """What is shown on a terminal, and the exit code; ended by Ctrl-C once it shows what is given."""
         master, slave = pty.openpty()
         with subprocess.Popen([self.rhec.path, *map(str, words)], stdin=slave, stdout=slave, stderr=slave, env=CLEAN) as process:
             os.close(slave)
             os.write(master, answer.encode())
-            if seconds:
-                time.sleep(seconds)
-                process.send_signal(signal.SIGINT)
-            shown = b""
+            shown = ""
             try:
                 while part := os.read(master, 10000):
-                    shown += part
+                    shown += part.decode(errors="replace")
+                    if until and until.search(shown):
+                        process.send_signal(signal.SIGINT)
+                        until = None
             except OSError:  # the other side is closed
                 pass
             process.wait(timeout=30 * cli.PATIENCE)
         os.close(master)
-        return shown.decode(), process.returncode
+        return shown, process.returncode
 
     def mistakes(self):
         good = self.sweep(SHORT + "grid: {seed: [1, 2]}\n", "good.yaml")
