@@ -468,5 +468,64 @@ class Mecanum:
                 "gyro": lambda: numpy.array([self.turn])}[sensor]()
 
 
+class Kart:
+    """A car that is told how hard to drive, not how fast, as somebody writes it down; its slopes, its drag and its brakes are not in
+    that. A receiver, an encoder of the wheels, and one of the steering.
+    """
+    step, heading, inputs_every, inputs_late = 0.1, 2, 2, 0.005
+    sensors = (Sensor("gps", "position", ("x_gps", "y_gps"), 20, 5, 0.1, 0.02, 0.02, 0.015),
+               Sensor("wheels", "rate", ("wheel_speed",), 4, 1, 0.01, 0.0, 0.04, quantum=0.01),
+               Sensor("steering", "angle", ("steering",), 5, 2, 0.004, 0.0, 0.01, quantum=0.003, zero=0.004))
+    wheelbase, ahead = 1.1, 0.3
+
+    def __init__(self, noise, speed):
+        self.noise, self.speed, self.time = noise, speed, 0.0
+        self.x = self.y = self.psi = self.v = self.delta = self.yaw_rate = 0.0
+        self.traction, self.grip = Slip(noise, 0.6, 0.95), Slip(noise, 0.75, 1.0)
+        self.hills, self.pace, self.phase = noise.uniform(0.02, 0.06, 2), noise.uniform(0.1, 0.3), noise.uniform(0.0, 6.0)
+        self.spin, self.inputs = 0.0, numpy.zeros(2)
+
+    @classmethod
+    def configuration(cls, estimator):
+        factor = {"typical": 0.3, "bounds": [0.2, 1.2], "nominal": 0.9}
+        equations = {
+            "options": {"wheelbase": {"unit": "m"}, "ahead": {"default": 0.0, "unit": "m"}},
+            "states": {"x": {"unit": "m", "typical": 10, "role": "position_x"}, "y": {"unit": "m", "typical": 10, "role": "position_y"},
+                       "psi": {"unit": "rad", "angle": True, "role": "heading"}, "v": {"unit": "m/s", "typical": 2}},
+            "inputs": {"drive": {"unit": "m/s^2", "typical": 1}, "delta": {"unit": "rad", "typical": 0.3, "bounds": [-0.6, 0.6]}},
+            "parameters": {"traction": factor, "grip": factor},
+            "outputs": {"x_gps": {"unit": "m", "typical": 10}, "y_gps": {"unit": "m", "typical": 10}, "wheel_speed": {"unit": "m/s", "typical": 2},
+                        "steering": {"unit": "rad", "typical": 0.3}},
+            "equations": "\n".join([
+                "x' = v * cos(psi)", "y' = v * sin(psi)", "psi' = grip * v * tan(delta) / wheelbase", "v' = traction * drive - 0.4 * v",
+                "x_gps = x + ahead * cos(psi)", "y_gps = y + ahead * sin(psi)", "wheel_speed = v", "steering = delta"])}
+        return {"step": cls.step, "model": {"equations": equations, "wheelbase": cls.wheelbase, "ahead": cls.ahead},
+                "noise": {"outputs": {"x_gps": 0.03, "y_gps": 0.03, "wheel_speed": 0.05, "steering": 0.015},
+                          "inputs": {"drive": 0.3, "delta": 0.03}, "states": {"v": 0.2}},
+                "estimator": {"name": estimator, "horizon": "3 s", "initial": {"sigma": {"psi": 3.2}}}}
+
+    def advance(self):
+        wanted = self.speed * (1.0 + 0.3 * math.sin(0.2 * self.time))
+        drive = min(max(1.5 * (wanted - self.v) + 0.5 * wanted, -3.0), 3.0)
+        turning = 0.35 * math.sin(self.pace * self.time + self.phase)
+        slope = 9.81 * (self.hills[0] * math.sin(0.05 * self.x) + self.hills[1] * math.sin(0.03 * self.y))
+        grip = self.grip.step()
+        self.v += TICK * ((1.0 - self.spin) * self.traction.step() * drive - 0.4 * self.v - slope)
+        self.delta += (turning - self.delta) * TICK / 0.15
+        self.yaw_rate = grip * self.v * math.tan(self.delta) / self.wheelbase
+        self.x += TICK * self.v * math.cos(self.psi)
+        self.y += TICK * self.v * math.sin(self.psi)
+        self.psi += TICK * self.yaw_rate
+        self.time += TICK
+        self.inputs = numpy.array([drive, turning])
+
+    def truth(self):
+        return numpy.array([self.x, self.y]), self.psi
+
+    def read(self, sensor):
+        return {"gps": lambda: antenna(self.x, self.y, self.psi, self.ahead), "wheels": lambda: numpy.array([self.v]),
+                "steering": lambda: numpy.array([self.delta])}[sensor]()
+
+
 VEHICLES = {"bicycle": Bicycle, "rover": Rover, "two_receivers": TwoReceivers, "skid_steer": SkidSteer, "tracks": Tracks, "tractor": Tractor, "slope": Slope,
-            "shuttle": Shuttle, "misbuilt": Misbuilt, "mecanum": Mecanum}
+            "shuttle": Shuttle, "misbuilt": Misbuilt, "mecanum": Mecanum, "kart": Kart}

@@ -54,6 +54,11 @@ class Rides:
         """Rides that never recover, and do not end with health lost."""
         return sum(ride["recovered"] < 0 and not ride["lost_at_end"] for ride in self.rides)
 
+    def off_at_end(self):
+        """How far these are off at their end [m]: the median and the most, in words."""
+        errors = [ride["errors"][-1] for ride in self.rides if ride["recovered"] < 0 and not ride["lost_at_end"]]
+        return f"; {quantile(errors, 0.5):.2f}, {max(errors):.2f} m" if errors else ""
+
     def moved(self):
         return [never_if_negative(ride["moved"] + (ride["moved"] >= 0)) for ride in self.rides]
 
@@ -100,7 +105,7 @@ class Result:
         return found
 
     def kinds_table(self):
-        lines = ["| fault | rides | recovered after: median, 99 %, most | never (of these not `lost`) | followed | `moved` after | honest: position, heading"
+        lines = ["| fault | rides | recovered after: median, 99 %, most | never (of these not `lost`; off at the end: median, most) | followed | `moved` after | honest: position, heading"
                  " | longest not | ok after: median, 99 % | volume while ok: median, more than twice | not reached |", "|" + "---|" * 11]
         for kind in self.kinds:
             rides = self.rides(kind)
@@ -109,7 +114,7 @@ class Result:
             lines.append("| " + " | ".join([
                 kind, str(len(rides.rides)),
                 ", ".join(count(quantile(rides.recovered, share)) for share in (0.5, 0.99, 1.0)),
-                f"{sum(each == NEVER for each in rides.recovered)} ({rides.unsaid()})",
+                f"{sum(each == NEVER for each in rides.recovered)} ({rides.unsaid()}{rides.off_at_end()})",
                 str(rides.followed()),
                 f"{min(moved)} to {max(moved)} ({len(moved)})" if moved else "",
                 f"{percent(rides.share('honest', 'counted'))}, {percent(rides.share('honest_heading', 'counted'))}",
