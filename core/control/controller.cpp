@@ -29,25 +29,6 @@ bool is_finite(const Obstacle& it) noexcept {
   return std::ranges::all_of(numbers, [](double number) { return std::isfinite(number); });
 }
 
-// A plan that covers less than this share of the path's way, and turns by less than this, is one to stand.
-constexpr double standing_share = 0.1, standing_turn = 0.1;  // [1], [rad]
-// It is so because the vehicle looks away from the path, and not because something is in its way, from this angle on.
-constexpr double away = 0.25 * std::numbers::pi;
-
-// A vehicle turns around on arcs that are wider than the tightest by this factor, so that it can correct what it does;
-// by this factor wider again each time that it has not arrived, up to a limit.
-constexpr double arc_margin = 1.15, wider_again = 1.3, most_margin = 3.0;
-// It does so with no more than this lateral acceleration [m/s^2], so slowly that it turns by no more than this while it
-// steers [rad], and at this share of the path's top speed where the path stops.
-constexpr double turning_acceleration = 1.0, turn_while_steering = 0.5, least_turning_share = 0.3;
-// A vehicle that is lost turns around after it has stood for so long [s].
-constexpr double patience = 5.0;
-// What is not tighter by this share is as tight.
-constexpr double tighter = 1e-3;
-// Of inputs that are tried for it every one is at its least, its straight or its largest value; of more than this many,
-// one at a time.
-constexpr int most_combined_inputs = 4;
-
 /// The problem's state that holds an input whose rate has a weight or bounds, or -1.
 std::vector<int> find_held_states(const Model& model, const Controller::Setup& setup) {
   const ModelDescription& about = model.description();
@@ -174,7 +155,7 @@ Controller::Controller(std::shared_ptr<const Model> model, std::shared_ptr<Solve
   solver_->setup(problem_);
   const Model& vehicle = *vehicle_;
   command_.inputs.assign(vehicle.input_count(), 0.0);
-  arc_margin_ = arc_margin;
+  forget_approach();
   if (const TermFunctions* terms = problem_.terms().functions(); terms && terms->limit_count() > 0) {
     command_.violations.assign(static_cast<std::size_t>(terms->limit_count()), 0.0);
     limit_values_.assign((static_cast<std::size_t>(N) + 1) * problem_.capacity().limit_row(), 0.0);
@@ -187,9 +168,10 @@ Controller::Controller(std::shared_ptr<const Model> model, std::shared_ptr<Solve
   go_straight(1.0, nominal_parameters_.data(), slipless_);
   for (std::size_t j = 0; j < nu; ++j) drives_.push_back(slipless_[nx + j] != 0.0);
   if (std::all_of(slipless_.begin(), slipless_.end(), [](double value) { return value == 0.0; }))
-    throw Error(
-        fmt::format("controller: the model '{}' does not say what drives it straight ahead; it cannot follow a path",
-                    vehicle.description().name));
+    throw Error(fmt::format(
+        "controller: the model '{}' does not say what drives it straight ahead; it cannot follow a path: give an "
+        "input or a state the role 'speed', or the model its straight motion (docs/equations.md)",
+        vehicle.description().name));
 }
 
 Controller::~Controller() = default;
@@ -209,9 +191,7 @@ void Controller::reset() noexcept {
 
 void Controller::locate() noexcept {
   is_located_ = false;
-  approach_->end();
-  arc_margin_ = arc_margin;
-  standing_ = 0.0;
+  forget_approach();
 }
 
 void Controller::locate(double arc_length) noexcept {
@@ -315,20 +295,6 @@ void Controller::choose_straight_motion_within_bounds(double ground_speed) noexc
   const int nx = vehicle_->state_count(), nu = vehicle_->input_count();
   for (int j = 0; j < nu; ++j)
     straight_[nx + j] = std::min(std::max(straight_[nx + j], input_lower(j)), input_upper(j));
-}
-
-/// Where the vehicle is on the path, or on its way back to it.
-double Controller::arc_length() const noexcept {
-  return approach_->is_under_way() ? approach_->arc_length() : follower_.arc_length();
-}
-
-double Controller::arc_length_after(double arc_length, double time, int& segment) const noexcept {
-  return approach_->is_under_way() ? approach_->arc_length_after(arc_length, time)
-                                   : path_.arc_length_after(arc_length, time, segment);
-}
-
-PathPoint Controller::point_at(double arc_length, int& segment) const noexcept {
-  return approach_->is_under_way() ? approach_->point_at(path_, arc_length) : path_.point_at(arc_length, segment);
 }
 
 /// Where the vehicle shall be at each node of a horizon that starts at an arc length.
@@ -476,17 +442,15 @@ void Controller::bound_speed() noexcept {
   }
 }
 
-/// Simulates the vehicle with the inputs that `wanted(interval, input)` says, as far as their bounds and those of their
+/// Simulates the vehicle with the inputs that `scratch_` holds by interval, as far as their bounds and those of their
 /// rates let them follow.
-template <class Wanted>
-void Controller::simulate_towards(const Wanted& wanted, Iterate& point) noexcept {
+void Controller::simulate(Iterate& point) noexcept {
   const int nu = vehicle_->input_count();
   for (int j = 0; j < nu; ++j) {
-    double held = held_state_[j] < 0 ? 0.0 : problem_.given_state()[held_state_[j]];
+    if (held_state_[j] < 0) continue;
+    double held = problem_.given_state()[held_state_[j]];
     for (int i = 0; i < problem_.intervals(); ++i) {
       double& input = scratch_[static_cast<std::size_t>(i) * nu + j];
-      input = wanted(i, j);
-      if (held_state_[j] < 0) continue;
       const double dt = problem_.duration(i), rate = (input - held) / dt;
       input = std::min(std::max(rate, problem_.input_lower(i, j)), problem_.input_upper(i, j));
       held += dt * input;
@@ -499,7 +463,10 @@ void Controller::simulate_towards(const Wanted& wanted, Iterate& point) noexcept
 
 /// Cold start: the reference inputs, rolled out.
 void Controller::start_cold() noexcept {
-  simulate_towards([this](int i, int j) { return input_reference(i, j); }, point_);
+  const int nu = vehicle_->input_count();
+  for (int i = 0; i < problem_.intervals(); ++i)
+    for (int j = 0; j < nu; ++j) scratch_[static_cast<std::size_t>(i) * nu + j] = input_reference(i, j);
+  simulate(point_);
 }
 
 /// Calls the solver and takes the command from its plan. False if there is no usable plan.
@@ -538,12 +505,7 @@ void Controller::keep_within_bounds() noexcept {
 void Controller::find_place(const Estimate& estimate) noexcept {
   const Roles& roles = vehicle_->description().roles;
   const double x = estimate.state[roles.position_x], y = estimate.state[roles.position_y];
-  if (approach_->is_under_way()) {
-    approach_->advance(x, y, estimate.state[roles.heading]);
-    if (approach_->is_under_way()) return;
-    if (approach_->has_arrived()) follower_.reset(approach_->target());
-    arc_margin_ = approach_->has_arrived() ? arc_margin : std::min(arc_margin_ * wider_again, most_margin);
-  }
+  if (goes_on_approaching(estimate)) return;
   if (!is_located_ && std::isfinite(x) && std::isfinite(y)) {
     double heading = std::numeric_limits<double>::quiet_NaN();
     if (roles.heading >= 0 && std::isfinite(estimate.state[roles.heading])) {
@@ -616,76 +578,11 @@ const Controller::Command& Controller::control(const Estimate& estimate, Clock::
     plan_inputs(0, command_.inputs.data());
   }
   command_.turns_around = approach_->is_under_way();
-  standing_ = faces_away() ? standing_ + setup_.interval : 0.0;
-  // Who does not know where the vehicle heads will know better soon, mostly; if not, it is motion that tells.
-  const bool may_turn = standing_ > (estimate.health.level == HealthLevel::lost ? patience : 0.0);
-  command_.faces_away = standing_ > 0.0 && !(may_turn && turn_around(estimate));
+  command_.faces_away = stays_looking_away(estimate);
   keep_within_bounds();
   RHEC_ASSERT(all_finite(command_.inputs), "a command is finite");
   is_finished_ = false;
   return command_;
-}
-
-/// Whether a plan neither moves nor turns a vehicle that looks the other way.
-bool Controller::faces_away() const noexcept {
-  const Roles& roles = vehicle_->description().roles;
-  if (roles.heading < 0 || !(std::abs(command_.heading_error) > away)) return false;
-  const int N = problem_.intervals();
-  const double *from = point_.state(0), *to = point_.state(N);
-  const double way =
-      std::hypot(to[roles.position_x] - from[roles.position_x], to[roles.position_y] - from[roles.position_y]);
-  const double wanted = arc_lengths_[static_cast<std::size_t>(N)] - arc_lengths_[0];
-  return way < standing_share * wanted && std::abs(to[roles.heading] - from[roles.heading]) < standing_turn;
-}
-
-/// Begins a way back to the path, as tight as the vehicle can turn, from the next sample on. False: there is none.
-bool Controller::turn_around(const Estimate& estimate) noexcept {
-  if (!setup_.turns_around) return false;
-  const Roles& roles = vehicle_->description().roles;
-  const double section_speed = std::abs(path_.point_at(follower_.arc_length()).speed);
-  const double speed = std::max(section_speed, least_turning_share * path_.top_speed());
-  const double sense = points_[0].in_reverse ? -1.0 : 1.0;
-  const int nu = vehicle_->input_count();
-  int trials = 1;
-  for (int j = 0; j < nu; ++j) trials = nu > most_combined_inputs ? trials + 2 : trials * 3;
-  Approach::Turn best{.radius = infinity};
-  for (int trial = 1; trial < trials; ++trial) {
-    const auto extreme = [&](int i, int input) {
-      int choice = 0;
-      if (nu > most_combined_inputs) {
-        choice = (trial + 1) / 2 == input + 1 ? 1 + trial % 2 : 0;
-      } else {
-        choice = trial;
-        for (int j = 0; j < input; ++j) choice /= 3;
-        choice %= 3;
-      }
-      return choice == 0 ? input_reference(i, input) : choice == 1 ? input_lower(input) : input_upper(input);
-    };
-    simulate_towards(extreme, relaxed_plan_);
-    double time = 0.0;
-    for (int i = 0; i < problem_.intervals(); ++i) {
-      const double *from = relaxed_plan_.state(i), *to = relaxed_plan_.state(i + 1), dt = problem_.duration(i);
-      bool is_within = true;
-      for (int k = 0; k < problem_.state_count(i + 1); ++k)
-        is_within = is_within && to[k] >= problem_.state_lower(i + 1)[k] && to[k] <= problem_.state_upper(i + 1)[k];
-      if (!is_within) break;
-      time += dt;
-      const double turn = std::abs(to[roles.heading] - from[roles.heading]);
-      const double middle = 0.5 * (to[roles.heading] + from[roles.heading]);
-      const double way = sense * (std::cos(middle) * (to[roles.position_x] - from[roles.position_x]) +
-                                  std::sin(middle) * (to[roles.position_y] - from[roles.position_y]));
-      if (!(turn > 0.0) || !(way >= 0.0)) continue;
-      const double radius = std::max(arc_margin_ * way / turn, speed * dt);
-      if (!(radius < (1.0 - tighter) * best.radius)) continue;
-      best = {radius, std::min({speed, radius * turn / dt / arc_margin, std::sqrt(turning_acceleration * radius),
-                                turn_while_steering * radius / time})};
-    }
-  }
-  const Pose here{estimate.state[roles.position_x], estimate.state[roles.position_y], estimate.state[roles.heading]};
-  if (!approach_->begin(path_, follower_.section(), follower_.arc_length(), here, best)) return false;
-  // The plan is one to stand.
-  has_plan_ = false;
-  return true;
 }
 
 /// Work that the robot need not wait for: assess and keep the plan before the problem changes to the next sample.

@@ -483,7 +483,7 @@ class Kart:
         self.x = self.y = self.psi = self.v = self.delta = self.yaw_rate = 0.0
         self.traction, self.grip = Slip(noise, 0.6, 0.95), Slip(noise, 0.75, 1.0)
         self.hills, self.pace, self.phase = noise.uniform(0.02, 0.06, 2), noise.uniform(0.1, 0.3), noise.uniform(0.0, 6.0)
-        self.spin, self.inputs = 0.0, numpy.zeros(2)
+        self.spin, self.inputs, self.command = 0.0, numpy.zeros(2), None
 
     @classmethod
     def configuration(cls, estimator):
@@ -492,13 +492,14 @@ class Kart:
             "options": {"wheelbase": {"unit": "m"}, "ahead": {"default": 0.0, "unit": "m"}},
             "states": {"x": {"unit": "m", "typical": 10, "role": "position_x"}, "y": {"unit": "m", "typical": 10, "role": "position_y"},
                        "psi": {"unit": "rad", "angle": True, "role": "heading"}, "v": {"unit": "m/s", "typical": 2}},
-            "inputs": {"drive": {"unit": "m/s^2", "typical": 1}, "delta": {"unit": "rad", "typical": 0.3, "bounds": [-0.6, 0.6]}},
+            "inputs": {"drive": {"unit": "m/s^2", "typical": 1, "bounds": [-3, 3]}, "delta": {"unit": "rad", "typical": 0.3, "bounds": [-0.6, 0.6]}},
             "parameters": {"traction": factor, "grip": factor},
             "outputs": {"x_gps": {"unit": "m", "typical": 10}, "y_gps": {"unit": "m", "typical": 10}, "wheel_speed": {"unit": "m/s", "typical": 2},
                         "steering": {"unit": "rad", "typical": 0.3}},
             "equations": "\n".join([
                 "x' = v * cos(psi)", "y' = v * sin(psi)", "psi' = grip * v * tan(delta) / wheelbase", "v' = traction * drive - 0.4 * v",
-                "x_gps = x + ahead * cos(psi)", "y_gps = y + ahead * sin(psi)", "wheel_speed = v", "steering = delta"])}
+                "x_gps = x + ahead * cos(psi)", "y_gps = y + ahead * sin(psi)", "wheel_speed = v", "steering = delta"]),
+            "straight_motion": "\n".join(["v = ground_speed", "drive = 0.4 * ground_speed / traction", "delta = 0"])}
         return {"step": cls.step, "model": {"equations": equations, "wheelbase": cls.wheelbase, "ahead": cls.ahead},
                 "noise": {"outputs": {"x_gps": 0.03, "y_gps": 0.03, "wheel_speed": 0.05, "steering": 0.015},
                           "inputs": {"drive": 0.3, "delta": 0.03}, "states": {"v": 0.2}},
@@ -508,6 +509,8 @@ class Kart:
         wanted = self.speed * (1.0 + 0.3 * math.sin(0.2 * self.time))
         drive = min(max(1.5 * (wanted - self.v) + 0.5 * wanted, -3.0), 3.0)
         turning = 0.35 * math.sin(self.pace * self.time + self.phase)
+        if self.command is not None:
+            drive, turning = min(max(self.command[0], -3.0), 3.0), min(max(self.command[1], -0.6), 0.6)
         slope = 9.81 * (self.hills[0] * math.sin(0.05 * self.x) + self.hills[1] * math.sin(0.03 * self.y))
         grip = self.grip.step()
         self.v += TICK * ((1.0 - self.spin) * self.traction.step() * drive - 0.4 * self.v - slope)

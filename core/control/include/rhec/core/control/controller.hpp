@@ -146,13 +146,15 @@ class RHEC_EXPORT Controller {
   double plan_violation() noexcept;
   double distance_from_plan(const Obstacle& obstacle) const noexcept;
   void measure_violations() noexcept;
-  bool faces_away() const noexcept;
+  bool stands_looking_away() const noexcept;
+  bool stays_looking_away(const Estimate& estimate) noexcept;
   double arc_length() const noexcept;
   double arc_length_after(double arc_length, double time, int& segment) const noexcept;
   PathPoint point_at(double arc_length, int& segment) const noexcept;
-  template <class Wanted>
-  void simulate_towards(const Wanted& wanted, Iterate& point) noexcept;
-  bool turn_around(const Estimate& estimate) noexcept;
+  void simulate(Iterate& point) noexcept;
+  void forget_approach() noexcept;
+  bool goes_on_approaching(const Estimate& estimate) noexcept;
+  bool turns_around(const Estimate& estimate) noexcept;
 
   Setup setup_;
   std::shared_ptr<const Model> vehicle_;
@@ -186,6 +188,7 @@ class RHEC_EXPORT Controller {
   std::size_t obstacle_count_ = 0;
   double pace_ = 1.0, wanted_pace_ = 1.0;  ///< share of the path's speeds
   double standing_ = 0.0;                  ///< for how long its plan has been to stand, looking away [s]
+  double stalled_ = 0.0;                   ///< for how long it has not moved on on its way back to the path [s]
   double arc_margin_ = 1.0;                ///< of arcs to turn around on, over the tightest
   double seen_ = 0.0;                      ///< when these were there [s]
   double now_ = 0.0;                       ///< time of the last estimate [s]

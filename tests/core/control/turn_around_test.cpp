@@ -1,0 +1,163 @@
+// A vehicle that looks away from its path: it turns around, or stands and says so.
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <memory>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include "rhec/core/control/controller.hpp"
+#include "rhec/plugins/robot/robot.hpp"
+#include "rhec/plugins/yaml/yaml.hpp"
+#include "support/allocations.hpp"
+
+namespace rhec {
+namespace turn_around_test {
+
+const Host& host() {
+  static const Host found;
+  return found;
+}
+
+std::unique_ptr<Controller> controller_on(const Path& path, const std::string& configuration) {
+  const Robot robot(host(), RobotOptions::table().parse(parse_yaml(configuration, "robot.yaml"), "robot"));
+  return robot.make_controller(path);
+}
+
+/// Follows the diagonal for so many samples from its tenth metre, looking off the path by an angle, without slip.
+struct Turned {
+  bool ever = false, now = false;  ///< facing away, by what the commands say
+  long allocations = 0;            ///< by the controller
+  int turning = 0;                 ///< samples in which it turns around, by what the commands say
+  double way = 0.0, beside = 0.0;  ///< along the path, and at the end to its left [m]
+  double farthest = 0.0;           ///< from the path [m]
+  double heading_error = 0.0;      ///< at the end [rad]
+};
+Turned turned(const std::string& configuration, double angle, int samples) {
+  const auto controller = controller_on(Path({{0.0, 0.0, 2.0}, {50.0, 50.0, 2.0}}), configuration);
+  const Model& model = controller->vehicle();
+  const std::vector<double> slip = nominal_values(model.description().parameters);
+  const Roles& roles = model.description().roles;
+  Estimate estimate;
+  estimate.state = Eigen::VectorXd::Zero(model.state_count());
+  const double start = 10.0 / std::numbers::sqrt2, step = 0.2;
+  roles.place(start, start, 0.25 * std::numbers::pi + angle, estimate.state.data());
+  estimate.parameters = Eigen::Map<const Eigen::VectorXd>(slip.data(), static_cast<Eigen::Index>(slip.size()));
+  Turned told;
+  for (int k = 0; k < samples; ++k) {
+    const long before = allocation_count();
+    const Controller::Command& command = controller->control(estimate);
+    told.allocations += allocation_count() - before;
+    told.now = command.faces_away;
+    told.ever |= told.now;
+    told.turning += command.turns_around;
+    Eigen::VectorXd next(model.state_count());
+    model.integrate({.count = 1,
+                     .states = estimate.state.data(),
+                     .inputs = command.inputs.data(),
+                     .parameters = slip.data(),
+                     .durations = &step,
+                     .next_states = next.data()});
+    estimate.state = next;
+    estimate.time += step;
+    controller->prepare();
+    told.beside = (estimate.state[roles.position_y] - estimate.state[roles.position_x]) / std::numbers::sqrt2;
+    told.farthest = std::max(told.farthest, std::abs(told.beside));
+  }
+  told.heading_error = std::remainder(estimate.state[roles.heading] - 0.25 * std::numbers::pi, 2.0 * std::numbers::pi);
+  told.way = (estimate.state[roles.position_x] + estimate.state[roles.position_y]) / std::numbers::sqrt2 - 10.0;
+  return told;
+}
+
+TEST(TurnAround, ThatIsAwayFromThePathIsTold) {
+  const char* const bicycle = "{model: bicycle_slip, controller: {turn_around: false}}";
+  for (const double angle : {std::numbers::pi, 3.0, -2.8}) {
+    const Turned away = turned(bicycle, angle, 50);
+    EXPECT_TRUE(away.now) << angle;
+    EXPECT_LT(std::abs(away.way), 0.5) << angle << ": it stands";
+  }
+  for (const double angle : {0.0, 1.0, -1.8}) {
+    const Turned about = turned(bicycle, angle, 100);
+    EXPECT_FALSE(about.ever) << angle << ": it turns round by itself";
+    EXPECT_GT(about.way, 20.0) << angle;
+  }
+  // In reverse the vehicle looks the other way, as it should.
+  const auto reverse = controller_on(Path({{0.0, 0.0, -1.0}, {20.0, 0.0, -1.0}}), bicycle);
+  Estimate estimate;
+  estimate.state = Eigen::Vector4d(0.0, 0.0, std::numbers::pi, 0.0);
+  estimate.parameters = Eigen::Vector2d(1.0, 1.0);
+  EXPECT_FALSE(reverse->control(estimate).faces_away);
+  estimate.state[2] = 0.0;
+  reverse->locate();
+  EXPECT_TRUE(reverse->control(estimate).faces_away);
+}
+
+TEST(TurnAround, AVehicleThatLooksAwayTurnsAround) {
+  for (const char* const vehicle :
+       {"model: bicycle_slip", "model: skid_steer", "model: tractor_trailer",
+        "{model: bicycle_slip, controller: {rate_bounds: {u2: [-0.5, 0.5]}}}",
+        "{model: bicycle_slip, controller: {weights: {stage: {u1: 5, u2: 5}, rates: {u1: 1, u2: 1}}}}"}) {
+    for (const double angle : {std::numbers::pi, 2.8, -2.9}) {
+      const Turned about = turned(vehicle, angle, 200);
+      EXPECT_FALSE(about.ever) << vehicle << " " << angle;
+      EXPECT_EQ(about.allocations, 0) << vehicle << " " << angle;
+      EXPECT_LT(about.turning, 130) << vehicle << " " << angle;
+      EXPECT_LT(about.farthest, 7.0) << vehicle << " " << angle;
+      EXPECT_LT(std::abs(about.beside), 0.01) << vehicle << " " << angle;
+      EXPECT_LT(std::abs(about.heading_error), 0.01) << vehicle << " " << angle;
+      EXPECT_GT(about.way, 30.0) << vehicle << " " << angle;
+    }
+    // One that looks back exactly cannot turn by itself.
+    EXPECT_GT(turned(vehicle, std::numbers::pi, 30).turning, 15) << vehicle;
+  }
+}
+
+// As somebody writes it down, told how hard to drive, without bounds, and not how fast: it stands when it begins.
+TEST(TurnAround, WhateverTheVehicleIsToldByItsInputs) {
+  const std::string kart = R"(
+model:
+  equations:
+    states:
+      x: {unit: m, typical: 10, role: position_x}
+      y: {unit: m, typical: 10, role: position_y}
+      psi: {unit: rad, angle: true, role: heading}
+      v: {unit: m/s, typical: 2}
+    inputs: {drive: {unit: m/s^2, typical: 1}, delta: {unit: rad, typical: 0.3, bounds: [-0.6, 0.6]}}
+    parameters: {grip: {nominal: 0.9}}
+    outputs: {x_gps: {unit: m}, y_gps: {unit: m}}
+    equations: |
+      x' = v * cos(psi)
+      y' = v * sin(psi)
+      psi' = grip * v * tan(delta) / 1.1
+      v' = drive - 0.4 * v
+      x_gps = x
+      y_gps = y
+    straight_motion: |
+      v = ground_speed
+      drive = 0.4 * ground_speed
+      delta = 0
+)";
+  const Turned about = turned(kart, 3.0, 200);
+  EXPECT_FALSE(about.ever);
+  EXPECT_GT(about.turning, 10);
+  EXPECT_LT(about.turning, 100);
+  EXPECT_LT(std::abs(about.beside), 0.05);
+  EXPECT_GT(about.way, 30.0);
+}
+
+// An estimate that is lost may be wrong of the heading, too.
+TEST(TurnAround, OfOneThatIsLostWaits) {
+  const auto controller = controller_on(Path({{0.0, 0.0, 2.0}, {50.0, 0.0, 2.0}}),
+                                        "{model: bicycle_slip, controller: {health: {lost: 0.5}}}");
+  Estimate estimate;
+  estimate.state = Eigen::Vector4d(10.0, 0.0, std::numbers::pi, 0.0);
+  estimate.parameters = Eigen::Vector2d(1.0, 1.0);
+  estimate.health.level = HealthLevel::lost;
+  int waited = 0;
+  while (waited < 100 && !controller->control(estimate).turns_around) ++waited;
+  EXPECT_NEAR(waited, 25, 2) << "five seconds";
+}
+
+}  // namespace turn_around_test
+}  // namespace rhec
