@@ -25,15 +25,16 @@ bool Approach::begin(const Path& path, int section, double arc_length, const Pos
   is_under_way_ = false;
   if (!(turn.radius > 0.0) || !(turn.speed > 0.0) || !std::isfinite(turn.radius)) return false;
   if (!std::isfinite(vehicle.x) || !std::isfinite(vehicle.y) || !std::isfinite(vehicle.direction)) return false;
-  const double end = path.section_end(section);
-  const double start = std::min(std::max(arc_length, path.section_start(section)), end);
   const Approach before = *this;
   turn_ = turn;
+  first_ = path.section_start(section);
+  last_ = path.section_end(section);
+  const double start = std::min(std::max(arc_length, first_), last_);
   DubinsPath best;
   double least = HUGE_VAL, target = 0.0;
   for (double ahead = 0.0; ahead <= most_ahead; ahead += ahead_step) {
     target_ = start + ahead * turn.radius;
-    if (target_ > end) break;
+    if (target_ > last_) break;
     const PathPoint there = path.point_at(target_);
     const double turned = there.in_reverse ? std::numbers::pi : 0.0;
     for (const DubinsPath::Kind& kind : DubinsPath::kinds) {
@@ -41,7 +42,7 @@ bool Approach::begin(const Path& path, int section, double arc_length, const Pos
                         {there.x, there.y, there.heading + turned}, turn.radius);
       const double cost = way_.length() + target_ - start;
       if (!way_.exists() || !(cost < least)) continue;
-      if (!has_room(path, path.section_start(section), end)) continue;
+      if (!has_room(path)) continue;
       least = cost;
       best = way_;
       target = target_;
@@ -54,23 +55,24 @@ bool Approach::begin(const Path& path, int section, double arc_length, const Pos
   }
   way_ = best;
   target_ = target;
-  last_ = end;
   done_ = 0.0;
   is_under_way_ = true;
   return true;
 }
 
-/// Whether the way is nowhere further beyond the room of a part of the path than at its start.
-bool Approach::has_room(const Path& path, double from, double to) const noexcept {
-  const double reach = way_.length() + turn_.radius;
-  from = std::max(from, target_ - reach);
-  to = std::max(from, std::min(to, target_ + reach));
+PathProjection Approach::beside(const Path& path, double x, double y) const noexcept {
+  const double reach = way_.length() + turn_.radius, from = std::max(first_, target_ - reach);
+  return path.closest(x, y, from, std::max(from, std::min(last_, target_ + reach)));
+}
+
+/// Whether the way is nowhere further beyond the path's room than at its start.
+bool Approach::has_room(const Path& path) const noexcept {
   double allowed = room_rounding;
   for (double along = 0.0; along <= way_.length(); along += room_step * turn_.radius) {
     const Pose place = way_.pose_at(along);
-    const PathProjection beside = path.closest(place.x, place.y, from, to);
-    const PathPoint point = path.point_at(beside.arc_length);
-    const double beyond = std::max(beside.lateral - point.left, -beside.lateral - point.right);
+    const auto [arc_length, lateral] = beside(path, place.x, place.y);
+    const PathPoint point = path.point_at(arc_length);
+    const double beyond = std::max(lateral - point.left, -lateral - point.right);
     if (along == 0.0) allowed = std::max(beyond, 0.0) + room_rounding;
     if (beyond > allowed) return false;
   }

@@ -34,13 +34,16 @@ class Approach {
   double target() const noexcept { return target_; }
   double arc_length_after(double arc_length, double time) const noexcept;
   PathPoint point_at(const Path& path, double arc_length) const noexcept;
+  /// The place of the path that is closest to one of this way.
+  PathProjection beside(const Path& path, double x, double y) const noexcept;
 
  private:
-  bool has_room(const Path& path, double from, double to) const noexcept;
+  bool has_room(const Path& path) const noexcept;
 
   DubinsPath way_;
   Turn turn_;
-  double target_ = 0.0, done_ = 0.0, last_ = 0.0;  ///< [m]; the last one is the end of the section
+  double target_ = 0.0, done_ = 0.0;  ///< [m]
+  double first_ = 0.0, last_ = 0.0;   ///< where the section begins and ends [m]
   bool in_reverse_ = false;
   bool is_under_way_ = false;
 };

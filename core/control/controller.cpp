@@ -358,14 +358,16 @@ void Controller::set_reference(double arc_length, const double* parameters, doub
     double* x = problem_.state_reference(i);
     std::copy_n(straight_.data(), nx, x);
     roles.place(target.x, target.y, target.heading, x);
+    double along = arc_lengths_[i];
+    const PathPoint place = place_of_terms(target, along);
     problem_.terms().place(i, {.time = time + i * setup_.interval,
-                               .x = target.x,
-                               .y = target.y,
-                               .heading = target.heading + (target.in_reverse ? std::numbers::pi : 0.0),
+                               .x = place.x,
+                               .y = place.y,
+                               .heading = place.heading + (place.in_reverse ? std::numbers::pi : 0.0),
                                .speed = target.speed,
-                               .arc_length = arc_lengths_[i],
-                               .left = target.left,
-                               .right = target.right,
+                               .arc_length = along,
+                               .left = place.left,
+                               .right = place.right,
                                .obstacles = {obstacles_.data(), obstacle_count_},
                                .seen = seen_});
     if (i < N) choose(0.5 * (target.speed + points_[i + 1].speed));

@@ -1,10 +1,12 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "approach.hpp"
 #include "rhec/core/base/infinity.hpp"
 #include "rhec/core/control/controller.hpp"
+#include "rhec/core/term/term_functions.hpp"
 
 // A vehicle that looks away from its path, and that no plan turns: its reference becomes a way back (Approach).
 
@@ -32,6 +34,8 @@ constexpr double tighter = 1e-3;
 constexpr int most_combined_inputs = 4;
 // How far an input is tried from what drives straight ahead, in typical magnitudes: not all have bounds.
 constexpr double most_tried = 3.0;
+// By so much more a limit is kept as well.
+constexpr double limit_rounding = 1e-6;
 
 /// How a vehicle turns in a trial, as far as it keeps its bounds, and forwards (sense 1) or in reverse (-1) at no more
 /// than a speed: on arcs that are wider by `margin`.
@@ -97,6 +101,14 @@ PathPoint Controller::point_at(double arc_length, int& segment) const noexcept {
   return approach_->is_under_way() ? approach_->point_at(path_, arc_length) : path_.point_at(arc_length, segment);
 }
 
+/// The place of the path where terms count: their limits are beside the path, also while the reference is a way back to
+/// it. `along`: the arc length of the reference, and then that of this place.
+PathPoint Controller::place_of_terms(const PathPoint& reference, double& along) const noexcept {
+  if (!approach_->is_under_way()) return reference;
+  along = approach_->beside(path_, reference.x, reference.y).arc_length;
+  return path_.point_at(along);
+}
+
 void Controller::forget_approach() noexcept {
   approach_->end();
   arc_margin_ = arc_margin;
@@ -139,6 +151,43 @@ bool Controller::stays_looking_away(const Estimate& estimate) noexcept {
   return standing_ > 0.0 && !turns_around(estimate);
 }
 
+/// By how much the limits of a node, all together, are not kept by its reference.
+double Controller::beyond_limits(int node) const noexcept {
+  const HorizonTerms& terms = problem_.terms();
+  const TermFunctions::Rows* rows = terms.rows(node, problem_.intervals(), true);
+  const double* values = limit_values_.data() + static_cast<std::ptrdiff_t>(node) * problem_.capacity().limit_row();
+  double sum = 0.0;
+  for (int r = 0; rows && r < rows->limits; ++r) {
+    const int limit = rows->first_limit + r;
+    sum += std::max({0.0, terms.lower(node)[limit] - values[r], values[r] - terms.upper(node)[limit]});
+  }
+  return sum;
+}
+
+/// Whether the way back keeps the limits of terms, soft ones, too, as well as the vehicle does now. Changes references.
+bool Controller::approach_keeps_limits(double time) noexcept {
+  if (limit_values_.empty()) return true;
+  const int N = problem_.intervals(), nx = problem_.model().state_count(), nu = vehicle_->input_count();
+  double allowed = -1.0;
+  for (double at = approach_->arc_length(); at < approach_->target();) {
+    set_reference(at, problem_.given_parameters(), time);
+    for (int i = 0; i < N; ++i)
+      for (int j = 0; j < nu; ++j)
+        scratch_[static_cast<std::size_t>(i) * nu + j] = held_state_[j] < 0 ? input_reference(i, j) : 0.0;
+    problem_.structure().set_decisions(relaxed_plan_, scratch_.data(), problem_.given_parameters());
+    for (int i = 0; i <= N; ++i) std::copy_n(problem_.state_reference(i), nx, relaxed_plan_.state(i));
+    problem_.evaluate_limits(relaxed_plan_, limit_values_.data(), scratch_);
+    if (allowed < 0.0) allowed = beyond_limits(0) + limit_rounding;
+    for (int i = 0; i <= N; ++i)
+      if (!(beyond_limits(i) <= allowed)) return false;
+    const double next = approach_->arc_length_after(at, N * setup_.interval);
+    if (!(next > at)) break;
+    at = next;
+    time += N * setup_.interval;
+  }
+  return true;
+}
+
 /// Begins a way back to the path, as tight as the vehicle can turn, from the next sample on. False: there is none, or
 /// not yet.
 bool Controller::turns_around(const Estimate& estimate) noexcept {
@@ -168,7 +217,17 @@ bool Controller::turns_around(const Estimate& estimate) noexcept {
   }
   const Pose pose{estimate.state[about.roles.position_x], estimate.state[about.roles.position_y],
                   estimate.state[about.roles.heading]};
+  const Approach before = *approach_;
   if (!approach_->begin(path_, follower_.section(), follower_.arc_length(), pose, best)) return false;
+  const PathPoint reference = command_.reference;
+  const bool is_free = approach_keeps_limits(estimate.time);
+  // The plan of this sample is still to be judged by its own references.
+  const Approach way = std::exchange(*approach_, before);
+  set_reference(arc_length(), estimate.parameters.data(), estimate.time);
+  problem_.finish(scratch_);
+  command_.reference = reference;
+  if (!is_free) return false;
+  *approach_ = way;
   // The plan is one to stand.
   has_plan_ = false;
   standing_ = 0.0;

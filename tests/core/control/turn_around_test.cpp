@@ -146,6 +146,19 @@ model:
   EXPECT_GT(about.way, 30.0);
 }
 
+// Limits of terms are beside the path, not beside the way back.
+TEST(TurnAround, KeepsLimitsBesideThePath) {
+  const auto with = [](const std::string& corridor) {
+    return turned("{model: bicycle_slip, controller: {terms: [{name: corridor, " + corridor + "}]}}", 3.0, 250);
+  };
+  const Turned narrow = with("left: 1, right: 1");
+  EXPECT_LT(narrow.farthest, 1.05);
+  EXPECT_LT(narrow.way, 3.0) << "there is no room to turn in";
+  const Turned wide = with("left: 6, right: 6");
+  EXPECT_LT(wide.farthest, 6.0);
+  EXPECT_GT(wide.way, 30.0);
+}
+
 // An estimate that is lost may be wrong of the heading, too.
 TEST(TurnAround, OfOneThatIsLostWaits) {
   const auto controller = controller_on(Path({{0.0, 0.0, 2.0}, {50.0, 0.0, 2.0}}),

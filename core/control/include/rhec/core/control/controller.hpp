@@ -148,9 +148,12 @@ class RHEC_EXPORT Controller {
   void measure_violations() noexcept;
   bool stands_looking_away() const noexcept;
   bool stays_looking_away(const Estimate& estimate) noexcept;
+  double beyond_limits(int node) const noexcept;
+  bool approach_keeps_limits(double time) noexcept;
   double arc_length() const noexcept;
   double arc_length_after(double arc_length, double time, int& segment) const noexcept;
   PathPoint point_at(double arc_length, int& segment) const noexcept;
+  PathPoint place_of_terms(const PathPoint& reference, double& along) const noexcept;
   void simulate(Iterate& point) noexcept;
   void forget_approach() noexcept;
   bool goes_on_approaching(const Estimate& estimate) noexcept;
