@@ -25,7 +25,6 @@ bool Approach::begin(const Path& path, int section, double arc_length, const Pos
   is_under_way_ = false;
   if (!(turn.radius > 0.0) || !(turn.speed > 0.0) || !std::isfinite(turn.radius)) return false;
   if (!std::isfinite(vehicle.x) || !std::isfinite(vehicle.y) || !std::isfinite(vehicle.direction)) return false;
-  const Approach before = *this;
   turn_ = turn;
   first_ = path.section_start(section);
   last_ = path.section_end(section);
@@ -49,10 +48,7 @@ bool Approach::begin(const Path& path, int section, double arc_length, const Pos
       in_reverse_ = there.in_reverse;
     }
   }
-  if (!best.exists()) {
-    *this = before;
-    return false;
-  }
+  if (!best.exists()) return false;
   way_ = best;
   target_ = target;
   done_ = 0.0;
@@ -111,7 +107,7 @@ PathPoint Approach::point_at(const Path& path, double arc_length) const noexcept
   point.heading = std::remainder(pose.direction - (in_reverse_ ? std::numbers::pi : 0.0), 2.0 * std::numbers::pi);
   point.curvature = way_.curvature_at(along);
   point.in_reverse = in_reverse_;
-  // Which the way has been found to keep to; it is that beside the path, not beside this way.
+  // Room is beside the path, not beside this way.
   point.left = point.right = infinity;
   return point;
 }

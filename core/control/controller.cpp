@@ -157,7 +157,8 @@ Controller::Controller(std::shared_ptr<const Model> model, std::shared_ptr<Solve
   command_.inputs.assign(vehicle.input_count(), 0.0);
   forget_approach();
   if (const TermFunctions* terms = problem_.terms().functions(); terms && terms->limit_count() > 0) {
-    command_.violations.assign(static_cast<std::size_t>(terms->limit_count()), 0.0);
+    for (auto* excess : {&command_.violations, &excess_now_, &excess_ahead_})
+      excess->assign(static_cast<std::size_t>(terms->limit_count()), 0.0);
     limit_values_.assign((static_cast<std::size_t>(N) + 1) * problem_.capacity().limit_row(), 0.0);
   }
   last_inputs_.assign(vehicle.input_count(), std::numeric_limits<double>::quiet_NaN());
@@ -338,7 +339,6 @@ void Controller::set_reference(double arc_length, const double* parameters, doub
   const Roles& roles = vehicle.description().roles;
   const int N = problem_.intervals(), nx = vehicle.state_count(), nu = vehicle.input_count();
   find_points(arc_length);
-  command_.reference = points_[0];
   bound_speed();
   double chosen_speed = std::numeric_limits<double>::quiet_NaN();
   for (int i = 0; i <= N; ++i) {
@@ -358,8 +358,10 @@ void Controller::set_reference(double arc_length, const double* parameters, doub
     double* x = problem_.state_reference(i);
     std::copy_n(straight_.data(), nx, x);
     roles.place(target.x, target.y, target.heading, x);
-    double along = arc_lengths_[i];
-    const PathPoint place = place_of_terms(target, along);
+    // Limits of terms are beside the path, also where the reference is a way back to it.
+    const bool is_on_path = !approach_->is_under_way();
+    const double along = is_on_path ? arc_lengths_[i] : approach_->beside(path_, target.x, target.y).arc_length;
+    const PathPoint place = is_on_path ? target : path_.point_at(along);
     problem_.terms().place(i, {.time = time + i * setup_.interval,
                                .x = place.x,
                                .y = place.y,
@@ -532,6 +534,7 @@ const Controller::Command& Controller::control(const Estimate& estimate, Clock::
   now_ = estimate.time;
   choose_pace(estimate.health);
   set_reference(arc_length(), estimate.parameters.data(), now_);
+  command_.reference = points_[0];
   const int heading = vehicle_->description().roles.heading;
   command_.heading_error = heading >= 0 ? angle_difference(estimate.state[heading], command_.reference.heading) : 0.0;
   write_held_inputs();
@@ -579,8 +582,7 @@ const Controller::Command& Controller::control(const Estimate& estimate, Clock::
     }
     plan_inputs(0, command_.inputs.data());
   }
-  command_.turns_around = approach_->is_under_way();
-  command_.faces_away = stays_looking_away(estimate);
+  note_standing(estimate.health);
   keep_within_bounds();
   RHEC_ASSERT(all_finite(command_.inputs), "a command is finite");
   is_finished_ = false;
@@ -593,9 +595,11 @@ void Controller::finish() noexcept {
   is_finished_ = true;
   solver_->finish(point_, command_.report);
   measure_violations();
-  if (!has_plan_) return;
-  shifter_.take(problem_, point_);
-  if (!command_.fallback) has_plan_ = is_finite(problem_, point_);
+  if (has_plan_) {
+    shifter_.take(problem_, point_);
+    if (!command_.fallback) has_plan_ = is_finite(problem_, point_);
+  }
+  look_for_way_back();
 }
 
 /// The sum by which a plan violates hard limits.
@@ -615,17 +619,22 @@ double Controller::plan_violation() noexcept {
 /// Of the limits that the vehicle meets next, whose data are still those of the last sample.
 void Controller::measure_violations() noexcept {
   if (command_.violations.empty()) return;
-  std::fill(command_.violations.begin(), command_.violations.end(), 0.0);
   problem_.evaluate_limits(point_, limit_values_.data(), scratch_);
+  find_excess(1, command_.violations);
+}
+
+/// By limit, how far the values that have been evaluated are beyond it up to a node, at most; 0: they keep it.
+void Controller::find_excess(int last, std::vector<double>& most) const noexcept {
+  std::fill(most.begin(), most.end(), 0.0);
   const HorizonTerms& terms = problem_.terms();
-  for (int i = 0; i <= 1; ++i) {
+  for (int i = 0; i <= last; ++i) {
     const TermFunctions::Rows* rows = terms.rows(i, problem_.intervals(), true);
     const double* values = limit_values_.data() + static_cast<std::ptrdiff_t>(i) * problem_.capacity().limit_row();
     for (int r = 0; rows && r < rows->limits; ++r) {
       const int limit = rows->first_limit + r;
       const double beyond = std::max(terms.lower(i)[limit] - values[r], values[r] - terms.upper(i)[limit]);
-      double& most = command_.violations[static_cast<std::size_t>(limit)];
-      most = std::max(most, beyond);
+      double& known = most[static_cast<std::size_t>(limit)];
+      known = std::max(known, beyond);
     }
   }
 }
@@ -637,12 +646,10 @@ void Controller::prepare() noexcept {
   const int nx = problem_.model().state_count(), np = problem_.model().parameter_count();
   std::copy_n(point_.state(1), nx, problem_.given_state());
   std::copy_n(problem_.given_parameters(), np, reference_parameters_.data());
-  const PathPoint reference = command_.reference;
   int segment = reference_segment_;
   const double next = arc_length_after(arc_length(), setup_.interval, segment);
   look_ahead(next, reference_parameters_.data());
   set_reference(next, reference_parameters_.data(), now_ + setup_.interval);
-  command_.reference = reference;
   problem_.finish(scratch_);
   if (!shifter_.apply(1, problem_, point_)) return;
   solver_->prepare(point_);

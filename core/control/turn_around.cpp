@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <utility>
 
 #include "approach.hpp"
 #include "rhec/core/base/infinity.hpp"
@@ -27,6 +26,8 @@ constexpr double turning_acceleration = 1.0, turn_while_steering = 0.5, least_tu
 // A vehicle that is lost turns around after it has stood for so long, and gives up a way on which it has not moved on
 // for so long [s].
 constexpr double patience = 5.0;
+// Where there is no way back, one is looked for again after so long [s].
+constexpr double again = 1.0;
 // What is not tighter by this share is as tight.
 constexpr double tighter = 1e-3;
 // Of inputs that are tried for it every one is at its least, its straight or its largest value; of more than this many,
@@ -101,18 +102,10 @@ PathPoint Controller::point_at(double arc_length, int& segment) const noexcept {
   return approach_->is_under_way() ? approach_->point_at(path_, arc_length) : path_.point_at(arc_length, segment);
 }
 
-/// The place of the path where terms count: their limits are beside the path, also while the reference is a way back to
-/// it. `along`: the arc length of the reference, and then that of this place.
-PathPoint Controller::place_of_terms(const PathPoint& reference, double& along) const noexcept {
-  if (!approach_->is_under_way()) return reference;
-  along = approach_->beside(path_, reference.x, reference.y).arc_length;
-  return path_.point_at(along);
-}
-
 void Controller::forget_approach() noexcept {
   approach_->end();
   arc_margin_ = arc_margin;
-  standing_ = stalled_ = 0.0;
+  standing_ = stalled_ = searched_ = 0.0;
 }
 
 /// Moves on with the vehicle on its way back to the path. False: it is on none, has come to its end, or does not get
@@ -145,30 +138,20 @@ bool Controller::stands_looking_away() const noexcept {
   return way < standing_share * wanted && std::abs(to[roles.heading] - from[roles.heading]) < standing_turn;
 }
 
-/// Whether it stands so, and there is no way back, or not yet.
-bool Controller::stays_looking_away(const Estimate& estimate) noexcept {
+/// What a command says of that. Of the first sample in which it stands so nothing is said: a way back is looked for.
+void Controller::note_standing(const Health& health) noexcept {
+  is_lost_ = health.level == HealthLevel::lost;
   standing_ = stands_looking_away() ? standing_ + setup_.interval : 0.0;
-  return standing_ > 0.0 && !turns_around(estimate);
-}
-
-/// By how much the limits of a node, all together, are not kept by its reference.
-double Controller::beyond_limits(int node) const noexcept {
-  const HorizonTerms& terms = problem_.terms();
-  const TermFunctions::Rows* rows = terms.rows(node, problem_.intervals(), true);
-  const double* values = limit_values_.data() + static_cast<std::ptrdiff_t>(node) * problem_.capacity().limit_row();
-  double sum = 0.0;
-  for (int r = 0; rows && r < rows->limits; ++r) {
-    const int limit = rows->first_limit + r;
-    sum += std::max({0.0, terms.lower(node)[limit] - values[r], values[r] - terms.upper(node)[limit]});
-  }
-  return sum;
+  if (standing_ == 0.0) searched_ = 0.0;
+  command_.turns_around = approach_->is_under_way();
+  command_.faces_away = standing_ > 0.0 && (!setup_.turns_around || is_lost_ || searched_ > 0.0);
 }
 
 /// Whether the way back keeps the limits of terms, soft ones, too, as well as the vehicle does now. Changes references.
 bool Controller::approach_keeps_limits(double time) noexcept {
   if (limit_values_.empty()) return true;
   const int N = problem_.intervals(), nx = problem_.model().state_count(), nu = vehicle_->input_count();
-  double allowed = -1.0;
+  bool is_first = true;
   for (double at = approach_->arc_length(); at < approach_->target();) {
     set_reference(at, problem_.given_parameters(), time);
     for (int i = 0; i < N; ++i)
@@ -177,9 +160,11 @@ bool Controller::approach_keeps_limits(double time) noexcept {
     problem_.structure().set_decisions(relaxed_plan_, scratch_.data(), problem_.given_parameters());
     for (int i = 0; i <= N; ++i) std::copy_n(problem_.state_reference(i), nx, relaxed_plan_.state(i));
     problem_.evaluate_limits(relaxed_plan_, limit_values_.data(), scratch_);
-    if (allowed < 0.0) allowed = beyond_limits(0) + limit_rounding;
-    for (int i = 0; i <= N; ++i)
-      if (!(beyond_limits(i) <= allowed)) return false;
+    if (is_first) find_excess(0, excess_now_);
+    is_first = false;
+    find_excess(N, excess_ahead_);
+    for (std::size_t l = 0; l < excess_now_.size(); ++l)
+      if (!(excess_ahead_[l] <= excess_now_[l] + limit_rounding)) return false;
     const double next = approach_->arc_length_after(at, N * setup_.interval);
     if (!(next > at)) break;
     at = next;
@@ -188,12 +173,15 @@ bool Controller::approach_keeps_limits(double time) noexcept {
   return true;
 }
 
-/// Begins a way back to the path, as tight as the vehicle can turn, from the next sample on. False: there is none, or
-/// not yet.
-bool Controller::turns_around(const Estimate& estimate) noexcept {
-  if (!setup_.turns_around) return false;
+/// Begins a way back to the path, as tight as the vehicle can turn, from the next sample on, where it is to have one.
+/// Changes references.
+void Controller::look_for_way_back() noexcept {
+  if (!setup_.turns_around || standing_ == 0.0) return;
   // Who does not know where the vehicle heads will know better soon, mostly; if not, it is motion that tells.
-  if (estimate.health.level == HealthLevel::lost && standing_ < patience) return false;
+  if (is_lost_ && standing_ < patience) return;
+  // For one that stands there is what there was.
+  if (searched_ > 0.0 && standing_ - searched_ < again) return;
+  searched_ = standing_;
   const ModelDescription& about = vehicle_->description();
   const double here = std::abs(path_.point_at(follower_.arc_length()).speed);
   const double speed = std::max(here, least_turning_share * path_.top_speed());
@@ -215,23 +203,13 @@ bool Controller::turns_around(const Estimate& estimate) noexcept {
     const bool is_faster = found.radius < (1.0 + tighter) * best.radius && found.speed > best.speed;
     if (found.radius < (1.0 - tighter) * best.radius || is_faster) best = found;
   }
-  const Pose pose{estimate.state[about.roles.position_x], estimate.state[about.roles.position_y],
-                  estimate.state[about.roles.heading]};
-  const Approach before = *approach_;
-  if (!approach_->begin(path_, follower_.section(), follower_.arc_length(), pose, best)) return false;
-  const PathPoint reference = command_.reference;
-  const bool is_free = approach_keeps_limits(estimate.time);
-  // The plan of this sample is still to be judged by its own references.
-  const Approach way = std::exchange(*approach_, before);
-  set_reference(arc_length(), estimate.parameters.data(), estimate.time);
-  problem_.finish(scratch_);
-  command_.reference = reference;
-  if (!is_free) return false;
-  *approach_ = way;
+  const double* const state = problem_.given_state();
+  const Pose pose{state[about.roles.position_x], state[about.roles.position_y], state[about.roles.heading]};
+  if (!approach_->begin(path_, follower_.section(), follower_.arc_length(), pose, best)) return;
+  if (!approach_keeps_limits(now_)) return approach_->end();
   // The plan is one to stand.
   has_plan_ = false;
-  standing_ = 0.0;
-  return true;
+  standing_ = searched_ = 0.0;
 }
 
 }  // namespace rhec

@@ -147,17 +147,16 @@ class RHEC_EXPORT Controller {
   double distance_from_plan(const Obstacle& obstacle) const noexcept;
   void measure_violations() noexcept;
   bool stands_looking_away() const noexcept;
-  bool stays_looking_away(const Estimate& estimate) noexcept;
-  double beyond_limits(int node) const noexcept;
+  void note_standing(const Health& health) noexcept;
+  void find_excess(int last, std::vector<double>& most) const noexcept;
   bool approach_keeps_limits(double time) noexcept;
   double arc_length() const noexcept;
   double arc_length_after(double arc_length, double time, int& segment) const noexcept;
   PathPoint point_at(double arc_length, int& segment) const noexcept;
-  PathPoint place_of_terms(const PathPoint& reference, double& along) const noexcept;
   void simulate(Iterate& point) noexcept;
   void forget_approach() noexcept;
   bool goes_on_approaching(const Estimate& estimate) noexcept;
-  bool turns_around(const Estimate& estimate) noexcept;
+  void look_for_way_back() noexcept;
 
   Setup setup_;
   std::shared_ptr<const Model> vehicle_;
@@ -172,7 +171,7 @@ class RHEC_EXPORT Controller {
   Iterate relaxed_plan_;  ///< that violates hard limits least, while another one is looked for; or a trial of inputs
   Report relaxed_report_;
   Command command_;
-  bool has_plan_ = false, prepared_ = false;
+  bool has_plan_ = false, prepared_ = false, is_lost_ = false;
   bool is_finished_ = true;  ///< the last sample's plan was assessed and kept for the next one
   bool is_located_ = false;  ///< where the vehicle is on the path is known
   // For which the inputs' bounds were made [m/s].
@@ -183,18 +182,19 @@ class RHEC_EXPORT Controller {
   std::int64_t fallbacks_ = 0;
   std::vector<double> scratch_, straight_, slipless_, largest_, smallest_, limit_values_;
   std::vector<double> nominal_parameters_, reference_parameters_, ahead_parameters_;
-  std::vector<double> last_inputs_;   ///< n_u, applied last; NaN: not known
+  std::vector<double> excess_now_, excess_ahead_;  ///< over limits of terms: of the vehicle, and on a way back
+  std::vector<double> last_inputs_;                ///< n_u, applied last; NaN: not known
   std::vector<std::uint8_t> drives_;  ///< n_u: whether an input moves the vehicle when it drives straight ahead
   std::vector<std::uint8_t> begins_;
   std::vector<Obstacle> obstacles_;  ///< room for as many as the terms regard; the first `obstacle_count_` are there
   std::vector<double> obstacle_distances_;  ///< of these from the plan [m]
   std::size_t obstacle_count_ = 0;
   double pace_ = 1.0, wanted_pace_ = 1.0;  ///< share of the path's speeds
-  double standing_ = 0.0;                  ///< for how long its plan has been to stand, looking away [s]
-  double stalled_ = 0.0;                   ///< for how long it has not moved on on its way back to the path [s]
-  double arc_margin_ = 1.0;                ///< of arcs to turn around on, over the tightest
-  double seen_ = 0.0;                      ///< when these were there [s]
-  double now_ = 0.0;                       ///< time of the last estimate [s]
+  // For how long it has stood, looking away, and had when a way back was last looked for; has not moved on on one [s].
+  double standing_ = 0.0, searched_ = 0.0, stalled_ = 0.0;
+  double arc_margin_ = 1.0;  ///< of arcs to turn around on, over the tightest
+  double seen_ = 0.0;        ///< when these were there [s]
+  double now_ = 0.0;         ///< time of the last estimate [s]
 };
 
 }  // namespace rhec
