@@ -321,8 +321,9 @@ void Estimator::push_input(double time, const double* inputs) noexcept {
   if (watch_) {
     watch_->clean_inputs(values_.data());
     const auto end = values_.begin() + static_cast<std::ptrdiff_t>(measured_inputs_);
-    // A message that says nothing is none: what was said before holds.
-    if (std::all_of(values_.begin(), end, [](double value) { return std::isnan(value); })) return;
+    // A message that says nothing is none: what was said before holds, unless it was wrong.
+    const bool is_empty = std::all_of(values_.begin(), end, [](double value) { return std::isnan(value); });
+    if (is_empty && !watch_->doubts_any_input()) return;
     time = place_on_timeline(time, inputs_source());
   }
   if (!std::isfinite(time)) return;
@@ -333,7 +334,7 @@ void Estimator::push_input(double time, const double* inputs) noexcept {
   grid_.push_input(time, values_.data());
 }
 
-/// What is missing of a message of inputs holds for as long as it would if no message came.
+/// What is missing of a message of inputs holds for as long as it would if no message came, unless it was wrong.
 void Estimator::hold_missing_inputs(double time) noexcept {
   const double longest = input_hold();
   for (std::size_t j = 0; j < measured_inputs_; ++j) {
@@ -341,7 +342,7 @@ void Estimator::hold_missing_inputs(double time) noexcept {
     const double age = time - held.time;
     if (!std::isnan(values_[j]))
       held = age < 0.0 ? held : HeldInput{values_[j], time};
-    else if (age >= 0.0 && age <= longest)
+    else if (age >= 0.0 && age <= longest && !watch_->doubts_input(j))
       values_[j] = held.value;
   }
 }

@@ -64,8 +64,12 @@ std::string in_words(const Health& health, const std::vector<Sensor>& sensors, c
     add(sensors[s].name, sensor.reasons, offset);
   }
   const bool is_named = health.off_input >= 0 && health.off_input < std::ssize(inputs);
-  add("inputs", is_named ? health.inputs.reasons & ~reason::off : health.inputs.reasons,
-      health.inputs.offset == 0.0 ? "were off" : "off");
+  const bool is_one_doubted = health.doubted_input >= 0 && health.doubted_input < std::ssize(inputs);
+  const std::uint32_t told = (is_named ? reason::off : 0u) | (is_one_doubted ? reason::rejected : 0u);
+  add("inputs", health.inputs.reasons & ~told, health.inputs.offset == 0.0 ? "were off" : "off");
+  if (is_one_doubted)
+    add("input " + inputs[static_cast<std::size_t>(health.doubted_input)].name,
+        health.inputs.reasons & reason::rejected, "off");
   if (is_named) {
     const Sensor& input = inputs[static_cast<std::size_t>(health.off_input)];
     add("input " + input.name, health.inputs.reasons & reason::off,

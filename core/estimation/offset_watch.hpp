@@ -97,6 +97,10 @@ class OffsetWatch {
   /// does not know.
   void withdraw_recent(WalkingFilter& filter) noexcept;
 
+  /// Nothing is taken out any more of an output.
+  void forget(int output) noexcept {
+    if (const int k = watched_of_[static_cast<std::size_t>(output)]; k >= 0) known_[static_cast<std::size_t>(k)] = {};
+  }
   /// Nothing is taken out any more of outputs of the position.
   void forget_receivers() noexcept;
 

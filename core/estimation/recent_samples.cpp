@@ -16,7 +16,7 @@ RecentSamples::RecentSamples(const WalkingFilter& like) {
     entry.covariance = like.covariance();
     entry.inputs.assign(static_cast<std::size_t>(model.input_count()), 0.0);
     entry.expected.assign(static_cast<std::size_t>(ny), 0.0);
-    entry.outputs = entry.rejected = MeasuredOutputs(ny);
+    entry.outputs = entry.rejected = entry.contradicting = MeasuredOutputs(ny);
   }
   values_ = weights_ = entries_[0].expected;
   for (const Variable& each : model.description().outputs) is_angle_.push_back(each.is_angle);
@@ -59,7 +59,7 @@ void RecentSamples::join(double time, const std::vector<double>& expected, Measu
 }
 
 void RecentSamples::remember(double time, const WalkingFilter& filter, const std::vector<double>& expected,
-                             Measured used, Measured rejected, bool has_position) noexcept {
+                             Measured used, const Besides& besides, bool has_position) noexcept {
   if (joins(time, has_position)) {
     join(time, expected, used);
   } else {
@@ -69,19 +69,21 @@ void RecentSamples::remember(double time, const WalkingFilter& filter, const std
     Entry& fresh = entry(0);
     fresh.time = time;
     fresh.outputs.assign(used);
-    fresh.rejected.assign(rejected);
+    fresh.rejected.assign(besides.rejected);
+    fresh.contradicting.clear();
     fresh.has_position = has_position;
     fresh.is_kept = false;
     fresh.samples = 0;
   }
   Entry& newest = entry(0);
   ++newest.samples;
+  newest.contradicting.add(besides.contradicting);
   newest.note(filter);
   std::copy(expected.begin(), expected.end(), newest.expected.begin());
 }
 
-int RecentSamples::with_positions(int positions) noexcept {
-  for (int ago = 1; ago < connected(); ++ago) {
+int RecentSamples::with_positions(int positions, int count) noexcept {
+  for (int ago = 1; ago < count; ++ago) {
     positions -= entry(ago - 1).has_position;
     if (positions == 0) return ago;
   }

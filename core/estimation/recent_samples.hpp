@@ -26,12 +26,13 @@ class RecentSamples {
     double time = std::numeric_limits<double>::quiet_NaN();  ///< of the last of its samples [s]
     Eigen::VectorXd mean;                                    ///< behind them
     Eigen::MatrixXd covariance;
-    std::vector<double> inputs;    ///< mean until the next one
-    std::vector<double> expected;  ///< n_y, behind them
-    MeasuredOutputs outputs;       ///< that were used
-    MeasuredOutputs rejected;      ///< positions that were not
-    bool has_position = false;     ///< of either kind
-    bool is_kept = false;          ///< it stays one of its own
+    std::vector<double> inputs;     ///< mean until the next one
+    std::vector<double> expected;   ///< n_y, behind them
+    MeasuredOutputs outputs;        ///< that were used
+    MeasuredOutputs rejected;       ///< positions that were not
+    MeasuredOutputs contradicting;  ///< as measured, of sensors that contradict inputs; the newest, if used or not
+    bool has_position = false;      ///< of either kind
+    bool is_kept = false;           ///< it stays one of its own
     int samples = 0;
 
     void note(const WalkingFilter& filter) noexcept {
@@ -68,10 +69,14 @@ class RecentSamples {
 
   /// The mean input (n_u, NaN where missing) since the newest sample.
   void note_inputs(const std::vector<double>& inputs) noexcept;
-  /// A sample that a filter has used, and what it expects of the outputs now (n_y). `rejected`: positions that it has
-  /// not used. It may become one with those before.
+  struct Besides {
+    Measured rejected;       ///< positions that were not used
+    Measured contradicting;  ///< as they were measured, of sensors that contradict inputs
+  };
+  /// A sample that a filter has used, and what it expects of the outputs now (n_y). It may become one with those
+  /// before.
   void remember(double time, const WalkingFilter& filter, const std::vector<double>& expected, Measured used,
-                Measured rejected, bool has_position) noexcept;
+                const Besides& besides, bool has_position) noexcept;
 
   /// A filter that knows what was known so many entries ago, and perhaps less, goes through what has been measured
   /// since: `take_in(entry)` at each of these, once it has been predicted.
@@ -89,7 +94,9 @@ class RecentSamples {
   }
   /// How many of the newest entries it takes to have so many positions, used or rejected, and what was known before;
   /// 0: so many are not remembered.
-  int with_positions(int positions) noexcept;
+  int with_positions(int positions) noexcept { return with_positions(positions, connected()); }
+  /// The same of all that are remembered.
+  int with_positions_known(int positions) noexcept { return with_positions(positions, known()); }
   /// How many lie behind the newest one with a position; 0: none do, or such a one is not remembered.
   int since_position() noexcept;
   /// How many lie behind a time; -1: all that are left, so that nothing is known of it.
@@ -98,6 +105,7 @@ class RecentSamples {
   int since(double time) noexcept;
 
  private:
+  int with_positions(int positions, int count) noexcept;
   static int at_most(std::int64_t count) noexcept {
     return static_cast<int>(count < static_cast<std::int64_t>(capacity) ? count : static_cast<std::int64_t>(capacity));
   }

@@ -366,6 +366,7 @@ SensorJudge::Finding SensorJudge::settle(double time, const double* outputs) noe
     for (const int j : sensors_[s].outputs)
       memory_->first_errors[j] =
           (findings_[s] & reason::rejected) && sees_position(j) ? raw_[j] - own_->filter.expected(j) : Memory::unknown;
+  if (consider_inputs()) return slip_is_new;
   if (disputed_samples_ == suspect_position && is_position_disputed() && memory_->offsets->has_recent()) {
     if (Finding finding; consider_other(outputs, finding)) return finding;
     // A position that jumps may have drifted before, and what seemed to be off was right.

@@ -136,6 +136,30 @@ std::vector<OffsetWatch::Watched> watched_outputs(const WalkingFilter& filter, c
   return watched;
 }
 
+/// The inputs that outputs see by themselves, whatever else the vehicle does, and of which nothing is left in what
+/// these see later.
+struct Seen {
+  int input, output;
+};
+std::vector<Seen> seen_inputs(const WalkingFilter& filter) {
+  const Model& model = filter.model();
+  const int nx = model.state_count(),
+            measured = model.input_count() - static_cast<int>(model.description().noisy_states.size());
+  const Eigen::MatrixXd jacobian = jacobian_in_motion(model, short_time);
+  std::vector<Seen> seen;
+  for (int i = 0; i < nx; ++i) {
+    for (int j = 0; j < measured; ++j) {
+      Eigen::RowVectorXd others = jacobian.row(i);
+      others[nx + j] = 0.0;
+      others.segment(nx + measured, model.input_count() - measured).setZero();  // noise
+      if (!jacobian.col(i).isZero(0.0) || !others.isZero(0.0) || jacobian(i, nx + j) == 0.0) continue;
+      for (int k = 0; k < model.output_count(); ++k)
+        if (filter.depends_on(k, i)) seen.push_back({j, k});
+    }
+  }
+  return seen;
+}
+
 WalkingFilter::Setup filter_setup(const SensorJudge::Setup& setup) {
   return {.noise = setup.noise,
           .walk = setup.walk,
@@ -199,6 +223,9 @@ SensorJudge::SensorJudge(std::shared_ptr<const Model> model, const Setup& setup)
     watched = watched_outputs(own_->filter, setup_.noise.output_variances);
     for (const int input : watched_inputs(own_->filter.model(), setup_.noise)) watched.push_back({.input = input});
   }
+  for (const Seen& each : seen_inputs(own_->filter))
+    if (const int sensor = sensor_of(each.output, sensors_); sensor >= 0 && !sees_position(each.output))
+      memory_->contradictions.push_back({each.input, each.output, static_cast<std::size_t>(sensor)});
   memory_->offsets = std::make_unique<OffsetWatch>(*model, watched, setup_.noise, offset_gate);
   if (model->description().roles.heading >= 0)
     for (auto* each : {&memory_->search, &memory_->second_thought})
@@ -210,11 +237,11 @@ SensorJudge::SensorJudge(std::shared_ptr<const Model> model, const Setup& setup)
   memory_->near_slip = Eigen::VectorXd::Zero(model->parameter_count());
   memory_->factor = memory_->before_covariance;
   memory_->recent = std::make_unique<RecentSamples>(own_->filter);
-  memory_->replayed = MeasuredOutputs(model->output_count());
+  memory_->replayed = memory_->contradicting = MeasuredOutputs(model->output_count());
   raw_.assign(model->output_count(), Memory::unknown);
   memory_->first_errors = memory_->retracted = memory_->expected = memory_->not_accused = raw_;
   input_.assign(model->input_count(), 0.0);
-  believed_input_ = input_;
+  believed_input_ = memory_->measured_inputs = memory_->inputs_without = input_;
   held_.assign(held_capacity, {0.0, MeasuredOutputs(model->output_count())});
   raw_weights_.reserve(raw_.size());
   innovations_.resize(innovation_capacity);
@@ -243,8 +270,10 @@ void SensorJudge::reset() noexcept {
   memory_->loss->reset();
   if (memory_->search) memory_->search->cancel();
   inputs_ = {};
-  off_input_ = -1;
+  off_input_ = doubted_input_ = -1;
   input_findings_ = 0;
+  memory_->doubts.assign(input_.size(), {});
+  std::ranges::fill(memory_->measured_inputs, Memory::unknown);
   calm_samples_ = setup_.calm;
   held_count_ = innovation_count_ = 0;
   memory_->recent->forget();
@@ -298,6 +327,10 @@ void SensorJudge::clean_inputs(double* inputs) noexcept {
     ++inputs_.rejected;
   }
   memory_->offsets->correct_inputs(inputs);
+  for (std::size_t j = 0; j < measured; ++j) {
+    if (!std::isnan(inputs[j])) memory_->measured_inputs[j] = inputs[j];
+    if (memory_->doubts[j].is_doubted) inputs[j] = Memory::unknown;
+  }
 }
 
 void SensorJudge::advance(double duration, const double* inputs, const double* more_sigmas) noexcept {
@@ -405,8 +438,8 @@ void SensorJudge::agree() noexcept {
 }
 
 /// Slip that measurements want beyond its bounds again and again is not what is wrong: an offset that was taken out of
-/// what is measured may be, or the heading. Whether the estimate goes on from elsewhere.
-bool SensorJudge::doubt_bounds(bool is_disputed, bool is_placed) noexcept {
+/// what is measured may be, or a measured input, or the heading. Whether the estimate goes on from elsewhere.
+SensorJudge::Finding SensorJudge::doubt_bounds(bool is_disputed, bool is_placed) noexcept {
   WalkingFilter& filter = own_->filter;
   double& beyond = memory_->beyond_bounds;
   beyond += Memory::slip_beyond_bounds(filter, memory_->before_update, setup_.noise);
@@ -415,6 +448,10 @@ bool SensorJudge::doubt_bounds(bool is_disputed, bool is_placed) noexcept {
   beyond = std::min(std::max(beyond, 0.0), 2.0 * impossibly_beyond);
   bool has_changed = false;
   if (beyond > impossibly_beyond) {
+    if (is_placed && distrust_instead()) {
+      beyond = 0.0;
+      return slip_is_new;
+    }
     input_findings_ |= reason::implausible;
     if (!is_disputed && memory_->offsets->has_recent()) {
       // What seemed to be off was right, and slip was not.
@@ -435,7 +472,7 @@ bool SensorJudge::doubt_bounds(bool is_disputed, bool is_placed) noexcept {
     end_dispute();
     has_changed = true;
   }
-  return has_changed;
+  return {.rebase = has_changed};
 }
 
 /// Each sensor by what the estimate expects of it; what does not pass is not used, and disputed.
@@ -468,6 +505,7 @@ SensorJudge::Finding SensorJudge::judge_each(double time, double* outputs) noexc
     for (const int j : sensors_[s].outputs) outputs[j] = Memory::unknown;
   }
   if (is_blind_) test_inputs(raw_.data());
+  test_doubted();
   if (is_placed || unplaced_samples_ == 0) memory_->unplaced_from = time;
   unplaced_samples_ = is_placed ? 0 : unplaced_samples_ + (is_disputed && counted);
   const int told = is_disputed ? offset_in_dispute() : -1;
@@ -492,11 +530,14 @@ SensorJudge::Finding SensorJudge::judge_each(double time, double* outputs) noexc
   if (!finding.rebase && !finding.release) {
     copy_numbers(filter.mean(), memory_->before_update);
     filter.update_as_expected(weighed(outputs));
-    finding.rebase = doubt_bounds(is_disputed, is_placed);
+    const Finding doubt = doubt_bounds(is_disputed, is_placed);
+    finding.rebase = doubt.rebase;
+    finding.release = doubt.release;
     memory_->offsets->take(filter, std::max(1.0, *std::ranges::max_element(excesses_)), memory_->whiteness_of,
                            memory_->is_counted);
     const bool is_told = told >= 0 && memory_->offsets->probable() == told;
     const bool is_found = !is_disputed && memory_->offsets->has_suspect();
+    if (distrust_again()) return slip_is_new;
     if (is_found && distrust_receiver()) return {.rebase = true};
     if (is_told) {
       memory_->offsets->adopt_candidate(filter);
@@ -563,6 +604,7 @@ SensorJudge::Finding SensorJudge::judge(double time, double* outputs, const doub
   if ((input_findings_ & ~reason::off) != 0 || (is_input_off && !is_known)) inputs_.reasons = input_findings_;
   if (calm_samples_ >= setup_.calm) inputs_.reasons = input_findings_ & reason::off;
   input_findings_ = 0;
+  if (is_blind_ || (inputs_.reasons & reason::rejected) == 0) doubted_input_ = -1;
   forget_reasons();
   return finding;
 }
@@ -642,7 +684,17 @@ void SensorJudge::remember(double time, const double* outputs) noexcept {
   }
   const bool is_known = std::isfinite(quickest);
   memory.recent->join_within(is_known ? std::min(setup_.step, quickest / Memory::most_between_positions) : 0.0);
-  memory.recent->remember(time, own_->filter, memory.expected, weighed(outputs), rejected.measured(), has_position);
+  memory.contradicting.assign(weighed(raw_.data()));
+  for (int j = 0; j < std::ssize(raw_); ++j) {
+    const bool contradicts = std::ranges::any_of(memory.contradictions, [&](const Contradiction& each) {
+      return sensor_of(j, sensors_) == static_cast<int>(each.sensor);
+    });
+    double& value = memory.contradicting.values()[j];
+    value = contradicts ? value + memory.offsets->offset(j) : Memory::unknown;
+  }
+  memory.recent->remember(time, own_->filter, memory.expected, weighed(outputs),
+                          {.rejected = rejected.measured(), .contradicting = memory.contradicting.measured()},
+                          has_position);
   memory.past->note(time, own_->filter);
 }
 

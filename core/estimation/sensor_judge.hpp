@@ -66,6 +66,9 @@ class SensorJudge {
   void begin_predicting() noexcept;
   void predict(double duration, const double* inputs, const double* input_sigmas, Estimate& estimate) noexcept;
 
+  // sensor_contradiction.cpp
+  bool doubts_input(std::size_t input) const noexcept;
+
   // sensor_dispute.cpp
   Retraction retraction() const noexcept;
   std::span<const double> jumps() const noexcept;
@@ -78,6 +81,7 @@ class SensorJudge {
   struct Memory;
   struct Record;
   struct Suspicion;
+  struct Contradiction;
 
   // sensor_judge.cpp
   void note_sample(double time, const double* outputs) noexcept;
@@ -88,7 +92,7 @@ class SensorJudge {
   void forget_reasons() noexcept;
   Finding judge_each(double time, double* outputs) noexcept;
   void agree() noexcept;
-  bool doubt_bounds(bool is_disputed, bool is_placed) noexcept;
+  Finding doubt_bounds(bool is_disputed, bool is_placed) noexcept;
   Measured weighed(const double* outputs) const noexcept;
   bool is_expected(std::size_t sensor) const noexcept;
   bool is_heard(std::size_t sensor) const noexcept;
@@ -153,6 +157,21 @@ class SensorJudge {
   bool is_placed_by_other(int position) const noexcept;
   int offset_in_dispute() noexcept;
 
+  /// The estimate goes on from elsewhere, and what was known of slip counts no longer.
+  static constexpr Finding slip_is_new{.release = true, .rebase = true};
+
+  // sensor_contradiction.cpp: a measured input is wrong, and a sensor that sees the same was blamed for it.
+  bool consider_inputs() noexcept;
+  bool distrust_instead() noexcept;
+  bool distrust(const Contradiction& each) noexcept;
+  bool is_explained_without_input(const Contradiction& each, WalkingFilter& filter) noexcept;
+  bool distrust_again() noexcept;
+  bool replay_without_input(const Contradiction& each, int ago, WalkingFilter& filter) noexcept;
+  void forget_slip(WalkingFilter& filter) const noexcept;
+  int entries_since_failure(const Contradiction& each) noexcept;
+  void as_measured(const Sensor& sensor, double* outputs) const noexcept;
+  void test_doubted() noexcept;
+
   // sensor_double_fault.cpp: a position has moved, and what others say since then is wrong, too.
   void consider_double_fault() noexcept;
   bool is_double_fault() const noexcept;
@@ -204,7 +223,8 @@ class SensorJudge {
   int calm_samples_ = 0;              ///< without a finding, in a row
   std::vector<SensorHealth> states_;  ///< by sensor
   SensorHealth inputs_;
-  int off_input_ = -1;  ///< the one that `inputs_.offset` is of
+  int off_input_ = -1;      ///< the one that `inputs_.offset` is of
+  int doubted_input_ = -1;  ///< one that is not believed by itself
   std::uint32_t input_findings_ = 0;
   std::vector<std::uint32_t> findings_;  ///< by sensor, of the last sample
   std::vector<int> quiet_;               ///< by sensor, samples since the last finding

@@ -80,6 +80,13 @@ struct SensorJudge::Hypothesis {
   }
 };
 
+/// An input, and an output that sees it, and nothing that has to do with it later: which of the two is wrong where they
+/// contradict each other is not to be seen from them.
+struct SensorJudge::Contradiction {
+  int input = 0, output = 0;
+  std::size_t sensor = 0;
+};
+
 /// What was known after the last samples, and the motion since then.
 struct SensorJudge::Memory {
   static constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
@@ -128,6 +135,7 @@ struct SensorJudge::Memory {
   Retraction released{unknown, unknown, nullptr};       ///< what would have to be taken back of that
   std::vector<double> retracted;                        ///< n_y, not missing of outputs that were wrong then
   MeasuredOutputs replayed;                             ///< what counts of a sample that is replayed or remembered
+  MeasuredOutputs contradicting;                        ///< what contradicts inputs, as it was measured
   /// How far slip that explains what is disputed is beyond its bounds, in its standard deviations.
   double slip_beyond = 0.0;
   StuckValues stuck;
@@ -137,6 +145,17 @@ struct SensorJudge::Memory {
   double covariance_factor = 1.0;
   double typical_volume = 0.0, volumes = 0.0;  ///< mean log sqrt(det P) over so many estimates
   void note_whiteness(double volume, Eigen::Index size) noexcept;
+  /// Of a measured input that is not believed by itself.
+  struct Doubt {
+    bool is_doubted = false;
+    int agreed = 0;                  ///< measurements in a row of those who contradicted it that agree with it
+    double least = 0.0, most = 0.0;  ///< of these, and what it said before
+    int remembered = 0;              ///< samples for which it is the one that is suspected first
+  };
+  std::vector<Contradiction> contradictions;
+  std::vector<Doubt> doubts;            ///< n_u
+  std::vector<double> measured_inputs;  ///< n_u, of the last message
+  std::vector<double> inputs_without;   ///< n_u, for what is tried
   std::unique_ptr<InformationLoss> loss;
   std::unique_ptr<WalkingFilter> trial;     ///< for what is tried within one call
   std::unique_ptr<WalkingFilter> ahead;     ///< behind the last sample that was judged

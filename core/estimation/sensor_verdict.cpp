@@ -185,6 +185,7 @@ void SensorJudge::assess(const Estimate& estimate, std::span<const Presence> pre
   health.sensors.assign(states_.begin(), states_.end());
   health.inputs = inputs_;
   health.off_input = off_input_;
+  health.doubted_input = doubted_input_;
   health.covariance_factor = covariance_factor();
   if (inputs == Presence::silent) health.inputs.reasons |= reason::silent;
   bool has_finding = reasons != 0 || calm_samples_ < setup_.calm || (health.inputs.reasons & ~reason::off) != 0;

@@ -17,6 +17,12 @@ const SensorWatch::Setup& SensorWatch::setup() const noexcept { return judge_->s
 std::shared_ptr<const FilterMemo> SensorWatch::make_memo() { return judge_->make_memo(); }
 void SensorWatch::reset() noexcept { judge_->reset(); }
 void SensorWatch::clean_inputs(double* inputs) noexcept { judge_->clean_inputs(inputs); }
+bool SensorWatch::doubts_input(std::size_t input) const noexcept { return judge_->doubts_input(input); }
+bool SensorWatch::doubts_any_input() const noexcept {
+  for (std::size_t j = 0; j < inputs().size(); ++j)
+    if (doubts_input(j)) return true;
+  return false;
+}
 void SensorWatch::advance(double duration, const double* inputs, const double* more_sigmas) noexcept {
   judge_->advance(duration, inputs, more_sigmas);
 }

@@ -23,6 +23,7 @@
 #include "rhec/sim/world/truth.hpp"
 #include "support/allocations.hpp"
 #include "support/bank_case.hpp"
+#include "support/contradicted_car.hpp"
 #include "support/turntable.hpp"
 
 namespace rhec {
@@ -232,6 +233,16 @@ TEST(EstimationAllocation, NoneWhereASensorIsSuspected) {
   options.filter = false;
   options.bank = true;
   EXPECT_EQ(allocations_in_the_loop(options), 0);
+}
+
+TEST(EstimationAllocation, NoneWhereAnInputIsContradicted) {
+  for (const char* estimator : {"ekf", "bank"}) {
+    const auto off = [](testing::SteeringMessage& each) { each.input -= 0.2; };
+    const testing::ContradictedRide ride =
+        testing::drive_contradicted(testing::contradicted_car(estimator), 1, 20.0, off, allocation_count);
+    EXPECT_TRUE(ride.says("input delta rejected")) << estimator;
+    EXPECT_EQ(ride.allocations, 0) << estimator;
+  }
 }
 
 TEST(EstimationAllocation, NoneWherePositionsAreLate) {

@@ -43,7 +43,7 @@ struct Drive {
     filter.update(outputs);
     filter.expect();
     for (int j = 0; j < 2; ++j) expected[static_cast<std::size_t>(j)] = filter.expected(j);
-    recent.remember(time, filter, expected, outputs, none, !std::isnan(slow));
+    recent.remember(time, filter, expected, outputs, {none, none}, !std::isnan(slow));
   }
   /// A slow one each second, and so many quick ones; they say the same, but for something that changes sign.
   void second(int quick) {

@@ -51,6 +51,7 @@ struct Health {
   std::vector<SensorHealth> sensors;  ///< as `sensors_of`; empty where nobody judges
   SensorHealth inputs;                ///< the measured inputs as a whole
   int off_input = -1;                 ///< the input that is off by `inputs.offset`; -1: none
+  int doubted_input = -1;             ///< the one that is rejected while others are believed; -1: none
   /// By how much larger the covariance that is given out is than the estimator's own, since innovations are correlated.
   double covariance_factor = 1.0;
 };

@@ -24,6 +24,7 @@ class RHEC_EXPORT InputWalk {
   void see(double measured, double duration) noexcept;
   /// By how much its variance grows in a duration [s].
   double growth(double duration) const noexcept { return seen_.rate * duration; }
+  void walk_at_least(double rate) noexcept { seen_.rate = rate > seen_.rate ? rate : seen_.rate; }
   void forget() noexcept { seen_ = {least_rate_, std::numeric_limits<double>::quiet_NaN(), 0.0}; }
 
   double lower, upper;
@@ -57,6 +58,8 @@ class RHEC_EXPORT InputGuess {
   void forget() noexcept;
   /// An interval [s] begins at a state with this covariance, with inputs as measured (n_u, NaN where missing).
   void begin(const double* measured, double duration, const Eigen::Ref<const Eigen::MatrixXd>& of_state) noexcept;
+  /// From now on an input walks by this variance per second at least, until it is measured.
+  void walk_at_least(int input, double rate) noexcept { walks_[static_cast<std::size_t>(input)].walk_at_least(rate); }
   bool is_any_missing() const noexcept { return is_any_missing_; }
   bool is_missing(int input) const noexcept { return is_missing_[static_cast<std::size_t>(input)] != 0; }
   /// Moments on the interval, before anything is measured behind its start. Those of measured inputs are 0.

@@ -47,8 +47,11 @@ class RHEC_EXPORT SensorWatch {
   const Setup& setup() const noexcept;
   std::shared_ptr<const FilterMemo> make_memo();  ///< see EstimationMethod::listen
   void reset() noexcept;
-  /// Marks measured inputs that cannot be as missing (NaN).
+  /// Marks measured inputs as missing (NaN) that cannot be, or are doubted.
   void clean_inputs(double* inputs) noexcept;
+  /// Whether a measured input is doubted by itself, since a sensor that contradicts it is right.
+  bool doubts_input(std::size_t input) const noexcept;
+  bool doubts_any_input() const noexcept;
   /// The time goes on by `duration` [s], with the mean input (n_u); between two samples in parts, if it is long.
   /// `more_sigmas` (n_u, or null): nobody has said for some time what the inputs are, and they may be off by as much.
   void advance(double duration, const double* inputs, const double* more_sigmas = nullptr) noexcept;
