@@ -531,8 +531,8 @@ SensorJudge::Finding SensorJudge::judge_each(double time, double* outputs) noexc
     copy_numbers(filter.mean(), memory_->before_update);
     filter.update_as_expected(weighed(outputs));
     const Finding doubt = doubt_bounds(is_disputed, is_placed);
+    if (doubt.release) return doubt;
     finding.rebase = doubt.rebase;
-    finding.release = doubt.release;
     memory_->offsets->take(filter, std::max(1.0, *std::ranges::max_element(excesses_)), memory_->whiteness_of,
                            memory_->is_counted);
     const bool is_told = told >= 0 && memory_->offsets->probable() == told;
@@ -684,14 +684,14 @@ void SensorJudge::remember(double time, const double* outputs) noexcept {
   }
   const bool is_known = std::isfinite(quickest);
   memory.recent->join_within(is_known ? std::min(setup_.step, quickest / Memory::most_between_positions) : 0.0);
-  memory.contradicting.assign(weighed(raw_.data()));
-  for (int j = 0; j < std::ssize(raw_); ++j) {
-    const bool contradicts = std::ranges::any_of(memory.contradictions, [&](const Contradiction& each) {
-      return sensor_of(j, sensors_) == static_cast<int>(each.sensor);
-    });
-    double& value = memory.contradicting.values()[j];
-    value = contradicts ? value + memory.offsets->offset(j) : Memory::unknown;
+  memory.contradicting.clear();
+  if (!memory.contradictions.empty()) {
+    memory.contradicting.assign(weighed(raw_.data()));
+    std::fill_n(memory.contradicting.values(), raw_.size(), Memory::unknown);
   }
+  for (const Contradiction& each : memory.contradictions)
+    for (const int j : sensors_[each.sensor].outputs)
+      memory.contradicting.values()[j] = raw_[static_cast<std::size_t>(j)] + memory.offsets->offset(j);
   memory.recent->remember(time, own_->filter, memory.expected, weighed(outputs),
                           {.rejected = rejected.measured(), .contradicting = memory.contradicting.measured()},
                           has_position);
