@@ -26,7 +26,7 @@ function save(table, name) {
   for (let i = 0; i < rowCount(table); ++i) lines.push(rowAt(table, i).map(quoted).join(","));
   const url = URL.createObjectURL(new Blob([lines.join("\n") + "\n"], {type: "text/csv"}));
   element("a", {href: url, download: `${name}.csv`}).click();
-  setTimeout(() => URL.revokeObjectURL(url), 1000);
+  setTimeout(() => URL.revokeObjectURL(url), 60000);  // a busy browser may not have begun to read it for a while
 }
 
 /// The folded table of a figure; `tableOf()` is asked each time it is opened or `refresh` is called.
