@@ -8,7 +8,7 @@
 
 #include <fmt/format.h>
 
-#include "approach.hpp"
+#include "detour.hpp"
 #include "rhec/core/base/angle.hpp"
 #include "rhec/core/base/assertion.hpp"
 #include "rhec/core/base/error.hpp"
@@ -22,6 +22,8 @@ namespace {
 
 // A heading whose standard deviation is larger does not count in the search for the vehicle's place [rad].
 constexpr double known_heading = 0.5;
+// A vehicle that is beyond hard limits is no faster than its reference by more than this factor.
+constexpr double most_haste = 1.25;
 
 bool is_finite(const Obstacle& it) noexcept {
   const double numbers[] = {it.x,       it.y,          it.semi_axis_along, it.semi_axis_across,
@@ -115,7 +117,7 @@ Controller::Controller(std::shared_ptr<const Model> model, std::shared_ptr<Solve
       held_state_(find_held_states(*vehicle_, setup_)),
       path_(std::move(path)),
       follower_(path_, setup_.search),
-      approach_(std::make_unique<Approach>()),
+      detour_(std::make_unique<Detour>()),
       problem_(make_problem(vehicle_, setup_, held_state_)),
       solver_(std::move(solver)),
       shifter_(problem_),
@@ -155,9 +157,9 @@ Controller::Controller(std::shared_ptr<const Model> model, std::shared_ptr<Solve
   solver_->setup(problem_);
   const Model& vehicle = *vehicle_;
   command_.inputs.assign(vehicle.input_count(), 0.0);
-  forget_approach();
+  detour_->forget();
   if (const TermFunctions* terms = problem_.terms().functions(); terms && terms->limit_count() > 0) {
-    for (auto* excess : {&command_.violations, &excess_now_, &excess_ahead_})
+    for (auto* excess : {&command_.violations, &detour_->excess_now, &detour_->excess_ahead})
       excess->assign(static_cast<std::size_t>(terms->limit_count()), 0.0);
     limit_values_.assign((static_cast<std::size_t>(N) + 1) * problem_.capacity().limit_row(), 0.0);
   }
@@ -185,6 +187,7 @@ void Controller::reset() noexcept {
   has_plan_ = prepared_ = false;
   is_finished_ = true;
   fallbacks_ = 0;
+  command_.report = {};
   obstacle_count_ = 0;
   pace_ = wanted_pace_ = 1.0;
   std::fill(last_inputs_.begin(), last_inputs_.end(), std::numeric_limits<double>::quiet_NaN());
@@ -192,7 +195,7 @@ void Controller::reset() noexcept {
 
 void Controller::locate() noexcept {
   is_located_ = false;
-  forget_approach();
+  detour_->forget();
 }
 
 void Controller::locate(double arc_length) noexcept {
@@ -358,10 +361,10 @@ void Controller::set_reference(double arc_length, const double* parameters, doub
     double* x = problem_.state_reference(i);
     std::copy_n(straight_.data(), nx, x);
     roles.place(target.x, target.y, target.heading, x);
-    // Limits of terms are beside the path, also where the reference is a way back to it.
-    const bool is_on_path = !approach_->is_under_way();
-    const double along = is_on_path ? arc_lengths_[i] : approach_->beside(path_, target.x, target.y).arc_length;
-    const PathPoint place = is_on_path ? target : path_.point_at(along);
+    // Limits of terms are beside the path, also where the reference is a way back to it, or backwards.
+    const bool is_beside = detour_->approach.is_under_way();
+    const double along = is_beside ? detour_->approach.beside(path_, target.x, target.y).arc_length : arc_lengths_[i];
+    const PathPoint place = detour_->is_under_way() ? path_.point_at(along) : target;
     problem_.terms().place(i, {.time = time + i * setup_.interval,
                                .x = place.x,
                                .y = place.y,
@@ -417,8 +420,10 @@ void Controller::bound_speed() noexcept {
     least = std::min(least, point.speed);
     most = std::max(most, point.speed);
   }
-  const double bound = setup_.speed_bound_factor * fastest + setup_.speed_bound_offset;
+  double bound = setup_.speed_bound_factor * fastest + setup_.speed_bound_offset;
   if (!std::isfinite(bound)) return;
+  // Nor does a vehicle race back to within its limits.
+  if (command_.report.status == Status::relaxed) bound = std::min(bound, most_haste * fastest);
   const double forwards = most > 0.0 || least == 0.0 ? bound : 0.0, in_reverse = least < 0.0 ? -bound : 0.0;
   if (forwards == bounded_forwards_ && in_reverse == bounded_in_reverse_) return;
   bounded_forwards_ = forwards;
@@ -473,6 +478,15 @@ void Controller::start_cold() noexcept {
   simulate(point_);
 }
 
+/// Another start, where no plan is found from that: the vehicle comes to a stop.
+void Controller::start_at_rest() noexcept {
+  choose_straight_motion_within_bounds(0.0);
+  const int nx = vehicle_->state_count(), nu = vehicle_->input_count();
+  for (int i = 0; i < problem_.intervals(); ++i)
+    std::copy_n(straight_.data() + nx, nu, scratch_.data() + static_cast<std::ptrdiff_t>(i) * nu);
+  simulate(point_);
+}
+
 /// Calls the solver and takes the command from its plan. False if there is no usable plan.
 bool Controller::find_plan(Clock::time_point deadline) noexcept {
   command_.report = solver_->feedback(point_, deadline);
@@ -483,6 +497,26 @@ bool Controller::find_plan(Clock::time_point deadline) noexcept {
       std::all_of(command_.inputs.begin(), command_.inputs.end(), [](double value) { return std::isfinite(value); });
   if (!is_number) command_.report.status = Status::bad_input;
   return is_number;
+}
+
+/// Looks for a plan from another guess. Where neither keeps hard limits, it is the one that violates them least.
+bool Controller::find_better(bool is_found, void (Controller::*start)() noexcept, Clock::time_point deadline) noexcept {
+  if (is_found) {
+    solver_->finish(point_, command_.report);
+    is_found = is_usable(command_.report.status);
+  }
+  const double violation = is_found ? plan_violation() : 0.0;
+  if (is_found) relaxed_plan_ = point_;
+  const Report first = command_.report;
+  (this->*start)();
+  const bool is_better = find_plan(deadline) && (!is_found || plan_violation() <= violation);
+  if (!is_better && is_found) {
+    point_ = relaxed_plan_;
+    command_.report = first;
+    plan_inputs(0, command_.inputs.data());
+  }
+  command_.report.fallback_used = true;
+  return is_better || is_found;
 }
 
 /// What is applied keeps the bounds, whatever a solver says.
@@ -509,7 +543,7 @@ void Controller::keep_within_bounds() noexcept {
 void Controller::find_place(const Estimate& estimate) noexcept {
   const Roles& roles = vehicle_->description().roles;
   const double x = estimate.state[roles.position_x], y = estimate.state[roles.position_y];
-  if (goes_on_approaching(estimate)) return;
+  if (goes_on_detour(estimate)) return;
   if (!is_located_ && std::isfinite(x) && std::isfinite(y)) {
     double heading = std::numeric_limits<double>::quiet_NaN();
     if (roles.heading >= 0 && std::isfinite(estimate.state[roles.heading])) {
@@ -547,25 +581,13 @@ const Controller::Command& Controller::control(const Estimate& estimate, Clock::
     if (!from_plan) start_cold();
   }
   bool is_found = find_plan(deadline);
-  if (from_plan && (!is_found || command_.report.status == Status::relaxed)) {
+  if (from_plan) {
     // The last plan may be a bad guess, e.g. after a jump of the estimate: try a simulation instead.
-    if (is_found) solver_->finish(point_, command_.report);
-    const bool is_relaxed = is_found && is_usable(command_.report.status);
-    const double violation = is_relaxed ? plan_violation() : 0.0;
-    if (is_relaxed) {
-      relaxed_plan_ = point_;
-      relaxed_report_ = command_.report;
-    }
-    start_cold();
-    is_found = find_plan(deadline) && (!is_relaxed || plan_violation() <= violation);
-    if (!is_found && is_relaxed) {
-      // Nor does a simulation lead to a plan that keeps the limits: the one that violates them least.
-      point_ = relaxed_plan_;
-      command_.report = relaxed_report_;
-      plan_inputs(0, command_.inputs.data());
-      is_found = true;
-    }
-    command_.report.fallback_used = true;
+    if (!is_found || command_.report.status == Status::relaxed)
+      is_found = find_better(is_found, &Controller::start_cold, deadline);
+  } else if (!limit_values_.empty() && (!is_found || command_.report.status == Status::relaxed)) {
+    // Straight ahead leads over limits, to where no plan may be near that keeps them.
+    is_found = find_better(is_found, &Controller::start_at_rest, deadline);
   }
   command_.fallback = !is_found;
   fallbacks_ += command_.fallback;
@@ -594,12 +616,16 @@ void Controller::finish() noexcept {
   if (is_finished_) return;
   is_finished_ = true;
   solver_->finish(point_, command_.report);
-  measure_violations();
+  if (!command_.violations.empty()) {
+    // Of the limits that the vehicle meets next, whose data are still those of this sample.
+    problem_.evaluate_limits(point_, limit_values_.data(), scratch_);
+    find_excess(1, command_.violations);
+  }
   if (has_plan_) {
     shifter_.take(problem_, point_);
     if (!command_.fallback) has_plan_ = is_finite(problem_, point_);
   }
-  look_for_way_back();
+  look_for_detour();
 }
 
 /// The sum by which a plan violates hard limits.
@@ -614,13 +640,6 @@ double Controller::plan_violation() noexcept {
       if (std::isinf(price[r])) sum += std::max({0.0, lower[r] - values[r], values[r] - upper[r]});
   }
   return sum;
-}
-
-/// Of the limits that the vehicle meets next, whose data are still those of the last sample.
-void Controller::measure_violations() noexcept {
-  if (command_.violations.empty()) return;
-  problem_.evaluate_limits(point_, limit_values_.data(), scratch_);
-  find_excess(1, command_.violations);
 }
 
 /// By limit, how far the values that have been evaluated are beyond it up to a node, at most; 0: they keep it.

@@ -155,9 +155,11 @@ const OptionTable<ControllerOptions>& ControllerOptions::table() {
                   "a wheel speed that is an input is at most this times the reference plus speed_bound_offset",
                   or_infinite(at_least(0.0)))
           .number("speed_bound_offset", &C::speed_bound_offset, "[m/s]", or_infinite(at_least(0.0)))
-          .flag("turn_around", &C::turn_around,
-                "a vehicle that looks away from the path, and that no plan turns, drives a way back to it; without "
-                "this it stands until somebody turns it")
+          .flag(
+              "turn_around", &C::turn_around,
+              "a vehicle that stands, since it looks away from the path and no plan turns it, drives a way back to it; "
+              "since limits keep it from going on, goes back along the path; without this it stands until somebody "
+              "moves it")
           .map("weights", &C::weights, WeightOptions::table().schema())
           .map("rate_bounds", &C::rate_bounds, rate_bounds_by_name().rows())
           .group("health", &C::health, PaceOptions::table())

@@ -197,6 +197,12 @@ void bind_commands(py::module_& module) {
           "turns_around", [](const CommandObject& self) { return self.value.turns_around; },
           "the vehicle drives a way back to the path, from which it has looked away")
       .def_property_readonly(
+          "goes_back", [](const CommandObject& self) { return self.value.goes_back; },
+          "the vehicle goes back along the path, since its limits keep it from going on")
+      .def_property_readonly(
+          "stands", [](const CommandObject& self) { return self.value.stands; },
+          "the plan is to stand where the path goes on")
+      .def_property_readonly(
           "pace", [](const CommandObject& self) { return self.value.pace; },
           "share of the path's speeds that is driven at present")
       .def_property_readonly(

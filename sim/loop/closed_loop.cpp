@@ -197,6 +197,8 @@ RunLog run_closed_loop(const Scenario& scenario, const LoopHooks& hooks) {
     }
     if (k >= limit) {
       log.ended = command.faces_away ? "the vehicle stands, facing away from the path"
+                  : command.stands   ? "the vehicle stands where its path goes on; what keeps it from that is in its "
+                                       "way, or one of its limits"
                                      : "the vehicle took more than three times as long as it should have";
       break;
     }

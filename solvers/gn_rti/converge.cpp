@@ -322,10 +322,30 @@ void GnRti::begin_at(const Iterate& guess) noexcept {
   if (ocp_->initial_state()) std::copy_n(ocp_->initial_state(), ocp_->state_count(0), best_.state(0));
 }
 
+void GnRti::note_met(const KktResidual& kkt, double objective) noexcept {
+  if (limits_.empty() || std::max(kkt.defect, kkt.bound_violation) > options_.tolerance) return;
+  objective += slack_costs(linearisation_->qp(), all_stages(*ocp_));
+  if (has_met_ && !(objective < met_objective_)) return;
+  met_ = best_;
+  met_violation_ = 0.0;
+  met_objective_ = objective;
+  has_met_ = true;
+}
+
+void GnRti::note_violation(const KktResidual& kkt) noexcept {
+  if (has_met_ || limits_.empty() || kkt.defect > std::sqrt(options_.tolerance)) return;
+  const double violation = costs_of_limits(best_).violation;
+  if (!(violation < met_violation_)) return;
+  met_ = best_;
+  met_violation_ = violation;
+}
+
 Report GnRti::converge(Iterate& iterate, Clock::time_point deadline) noexcept {
   Report report;
   qp_solver_.set_cheap(false);
   search_.begin();
+  has_met_ = false;
+  met_violation_ = std::numeric_limits<double>::infinity();
   const Iterate* guess = &iterate;
   begin_at(*guess);
   report.status = Status::iteration_limit;
@@ -335,8 +355,9 @@ Report GnRti::converge(Iterate& iterate, Clock::time_point deadline) noexcept {
   int refinements_left = most_refinements;
   int slow = 0, short_steps = 0, stagnant = 0, first_iteration = 0;
   for (;; ++report.iterations) {
-    linearise(best_);
+    const double objective = linearise(best_);
     report.kkt = kkt_residual(*qp_, best_);
+    note_met(report.kkt, objective);
     const double residual = report.kkt.largest();
     if (residual <= options_.tolerance) {
       report.status = Status::solved;
@@ -441,6 +462,7 @@ Report GnRti::converge(Iterate& iterate, Clock::time_point deadline) noexcept {
       continue;
     }
     if (!accepted || is_hopeless) {
+      note_violation(report.kkt);
       // A point that meets everything is no sign of infeasibility, whatever became of the QP there.
       const bool is_feasible_point = std::max(report.kkt.defect, report.kkt.bound_violation) <= options_.tolerance;
       const bool is_violated =
@@ -461,6 +483,13 @@ Report GnRti::converge(Iterate& iterate, Clock::time_point deadline) noexcept {
     short_steps = step_length_ < short_step ? short_steps + 1 : 0;
     is_settled = step_length_ == 1.0 && std::abs(slope_) <= settled_merit * (1.0 + std::abs(merit_after));
     std::swap(best_, trial_);
+  }
+  // Where there is a point that meets everything there is a plan, however far others went astray. Real-time iterations
+  // begin where hard limits are violated least, and go on so.
+  if (report.status == Status::infeasible &&
+      (has_met_ || (options_.mode == Mode::rti && std::isfinite(met_violation_)))) {
+    best_ = met_;
+    report.status = has_met_ ? Status::stalled : Status::relaxed;
   }
   const double objective = ocp_->evaluate(best_, nullptr, scratch_);
   if (report.status != Status::infeasible && is_finite(*ocp_, best_) && std::isfinite(objective))

@@ -94,7 +94,7 @@ void GnRti::setup(const Ocp& ocp) {
   qp_solver_ = StageQpSolver(capacity);
   for (Iterate* iterate : {&step_, &trial_, &best_, &other_trial_, &first_step_}) *iterate = Iterate(capacity);
   if (capacity.limits > 0) {
-    other_start_ = tracking_start_ = Iterate(capacity);
+    other_start_ = tracking_start_ = met_ = Iterate(capacity);
     tracking_.setup(ocp);
     search_.setup(ocp);
   }
@@ -123,13 +123,14 @@ Hessian GnRti::hessian() const noexcept {
 }
 
 /// Linearises at an iterate. The exact Hessian needs costates; an iterate without any first gets those that fit it.
-void GnRti::linearise(Iterate& iterate) noexcept {
+double GnRti::linearise(Iterate& iterate) noexcept {
   if (hessian() == Hessian::exact && !has_costates(*ocp_, iterate)) {
     linearisation_->linearise(iterate, Hessian::gauss_newton);
     set_costates(linearisation_->qp(), iterate);
   }
-  linearisation_->linearise(iterate, hessian());
+  const double objective = linearisation_->linearise(iterate, hessian());
   qp_ = &linearisation_->qp();
+  return objective;
 }
 
 void GnRti::prepare(const Iterate& guess) noexcept {

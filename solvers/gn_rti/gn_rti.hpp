@@ -67,7 +67,7 @@ class GnRti final : public Solver {
 
  private:
   Hessian hessian() const noexcept;
-  void linearise(Iterate& iterate) noexcept;
+  double linearise(Iterate& iterate) noexcept;
   void settle(Iterate& iterate, Report& report) noexcept;
   Report real_time(Iterate& iterate, Clock::time_point deadline) noexcept;
   bool is_surprised() const noexcept;
@@ -98,6 +98,8 @@ class GnRti final : public Solver {
   void begin_priced(double price) noexcept;
   bool is_violation_stuck(int iterations) noexcept;
   bool is_nearly_feasible() noexcept;
+  void note_met(const KktResidual& kkt, double objective) noexcept;
+  void note_violation(const KktResidual& kkt) noexcept;
   void set_price(double price) noexcept;
   bool raise_price(double merit_after) noexcept;
   StageQpSolver::Outcome solve_priced(Report& report, Clock::time_point deadline) noexcept;
@@ -143,6 +145,11 @@ class GnRti final : public Solver {
   TrackingStart tracking_;
   Iterate tracking_start_;
   bool has_tracking_start_ = false;
+  // Of the points of this solve that meet all constraints, the one with the least objective; without any, of those that
+  // no step leads on from, the one that violates hard limits least.
+  Iterate met_;
+  double met_objective_ = 0.0, met_violation_ = 0.0;
+  bool has_met_ = false;
 };
 
 }  // namespace rhec::gn_rti

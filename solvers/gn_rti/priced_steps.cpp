@@ -64,7 +64,8 @@ bool GnRti::is_violation_stuck(int iterations) noexcept {
 }
 
 bool GnRti::is_nearly_feasible() noexcept {
-  return costs_of_limits(best_).violation <= std::max(options_.tolerance, small_violation * first_violation_);
+  return costs_of_limits(best_).violation <=
+         std::max(std::sqrt(options_.tolerance), small_violation * first_violation_);
 }
 
 /// Begins again at the guess: steps that went astray may have led far away.

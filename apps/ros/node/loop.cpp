@@ -85,6 +85,10 @@ const char* in_words(Driving driving) noexcept {
       return "stands: the path leads away behind the vehicle; turn it, or begin the path with a turn";
     case Driving::turning_around:
       return "turns around: the path leads away behind the vehicle";
+    case Driving::standing:
+      return "stands where the path goes on: something is in its way, or a limit leaves no other plan";
+    case Driving::going_back:
+      return "goes back along the path: a limit keeps it from going on";
     case Driving::driving:
       break;
   }
@@ -399,6 +403,10 @@ void Loop::cycle() {
       driving = Driving::facing_away;
     } else if (command->turns_around) {
       driving = Driving::turning_around;
+    } else if (command->goes_back) {
+      driving = Driving::going_back;
+    } else if (command->stands) {
+      driving = Driving::standing;
     }
   }
   const Clock::time_point controlled = Clock::now();

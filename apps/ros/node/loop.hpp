@@ -35,6 +35,8 @@ enum class Driving : std::uint8_t {
   estimating,      ///< this node does not steer
   facing_away,     ///< the path leads away behind the vehicle, and it stands
   turning_around,  ///< the same, and it drives a way back to the path
+  standing,        ///< where the path goes on: something is in the way, or limits leave no other plan
+  going_back,      ///< along the path, since limits keep the vehicle from going on
   driving
 };
 const char* in_words(Driving driving) noexcept;

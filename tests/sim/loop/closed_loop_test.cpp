@@ -120,6 +120,25 @@ TEST(Ends, AVehicleThatPassesTheEndFarBesideItIsNotThere) {
   EXPECT_GT(std::abs(log.samples.back().tracking), 10.0);
 }
 
+TEST(Ends, AVehicleThatSomethingIsInTheWayOfStands) {
+  Settings settings = parse_yaml(R"(
+speed: 2
+model: {name: bicycle_slip}
+estimator: {name: truth}
+path: {name: zigzag, legs: 1, leg_length: 30}
+terrain: {name: constant, values: {kappa: 0.9, mu: 0.9}}
+controller:
+  terms:
+    - {name: corridor, left: 1, right: 1, hard: true}
+    - {name: obstacles, hard: true, obstacles: [{x: 20, y: -20, radius: 2}]}
+)",
+                                 "blocked.yaml");
+  const RunLog log = run_closed_loop({Host(), settings});
+  EXPECT_FALSE(log.completed);
+  EXPECT_THAT(log.ended, testing::HasSubstr("the vehicle stands where its path goes on"));
+  EXPECT_LT(log.samples.back().true_state[0], 20.0);
+}
+
 TEST(Headlands, AreDrivenInReverse) {
   for (const int seed : {71, 72}) {
     Settings settings = load_yaml(SCENARIOS "/headland.yaml");

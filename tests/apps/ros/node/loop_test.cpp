@@ -124,9 +124,9 @@ TEST_F(LoopTest, SaysWhichProcessorsThereAre) {
 }
 
 TEST(Driving, HasWords) {
-  for (const Driving driving :
-       {Driving::clock, Driving::waiting, Driving::heading, Driving::no_path, Driving::stopped, Driving::silent,
-        Driving::finished, Driving::estimating, Driving::facing_away, Driving::turning_around, Driving::driving})
+  for (const Driving driving : {Driving::clock, Driving::waiting, Driving::heading, Driving::no_path, Driving::stopped,
+                                Driving::silent, Driving::finished, Driving::estimating, Driving::facing_away,
+                                Driving::turning_around, Driving::standing, Driving::going_back, Driving::driving})
     EXPECT_STRNE(in_words(driving), "");
 }
 

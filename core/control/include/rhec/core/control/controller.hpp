@@ -16,7 +16,7 @@
 
 namespace rhec {
 
-class Approach;
+struct Detour;
 
 enum class ReferenceSpeed {
   ground,  ///< the path's speed is over ground: the wheels turn faster by the estimated slip
@@ -38,7 +38,8 @@ enum class ReferenceSpeed {
 /// `applied` has said what it is.
 ///
 /// A vehicle that looks away from the path, and that no plan within the horizon turns, goes round: its reference is the
-/// shortest way back to the path by arcs that it can drive, as its model says, until it is there (docs/paths.md).
+/// shortest way back to the path by arcs that it can drive, as its model says, until it is there. One that its limits
+/// keep from going on, looking out of them, goes back along the path until it is aligned (docs/paths.md).
 ///
 /// Terms of the problem (RhcProblem::Setup) get the reference of each node, and the obstacles of `set_obstacles`.
 /// Allocates in its constructor only.
@@ -57,7 +58,7 @@ class RHEC_EXPORT Controller {
     std::vector<double> rate_weights;                        ///< n_u, of squared rates; empty: 0
     std::vector<double> rate_lower, rate_upper;  ///< n_u, bounds of rates [unit of the input / s]; empty: none
     PathFollower::Window search;
-    bool turns_around = true;  ///< drives a way back to a path that it looks away from; false: it stands
+    bool turns_around = true;  ///< turns around, or goes back, where it cannot go on; false: it stands
     /// Share of the path's speeds while an estimate's health is not `ok`. It changes over time, so that the vehicle
     /// slows, stops on the path, and starts again. A heading is not found without motion: while it is searched for the
     /// first time all is as with `ok`, and later, where the place is known (reason::heading), the share is `heading`.
@@ -87,6 +88,10 @@ class RHEC_EXPORT Controller {
     /// not, cannot, or has no room to: it stays there until somebody turns it, or the path is another.
     bool faces_away = false;
     bool turns_around = false;  ///< the reference is a way back to the path, which the vehicle has looked away from
+    bool goes_back = false;  ///< the reference is the path, backwards, since the vehicle's limits keep it from going on
+    /// The plan is to stand where the path goes on, or has begun with that for five seconds: it covers less than a
+    /// tenth of the way that it should. Something is in the way, limits leave no other, or the vehicle faces away.
+    bool stands = false;
     /// By limit of the terms (TermFunctions::limit_names), how far what follows next is beyond it: the plan's first
     /// interval and the node at its end; 0: it is kept. Of this sample from `finish` on.
     std::vector<double> violations;
@@ -141,12 +146,13 @@ class RHEC_EXPORT Controller {
   void look_ahead(double arc_length, const double* parameters) noexcept;
   void write_held_inputs() noexcept;
   void start_cold() noexcept;
+  void start_at_rest() noexcept;
   void keep_within_bounds() noexcept;
   bool find_plan(Clock::time_point deadline) noexcept;
+  bool find_better(bool is_found, void (Controller::*start)() noexcept, Clock::time_point deadline) noexcept;
   double plan_violation() noexcept;
   double distance_from_plan(const Obstacle& obstacle) const noexcept;
-  void measure_violations() noexcept;
-  bool stands_looking_away() const noexcept;
+  bool plans_to_stand(int intervals) const noexcept;
   void note_standing(const Health& health) noexcept;
   void find_excess(int last, std::vector<double>& most) const noexcept;
   bool approach_keeps_limits(double time) noexcept;
@@ -154,26 +160,25 @@ class RHEC_EXPORT Controller {
   double arc_length_after(double arc_length, double time, int& segment) const noexcept;
   PathPoint point_at(double arc_length, int& segment) const noexcept;
   void simulate(Iterate& point) noexcept;
-  void forget_approach() noexcept;
-  bool goes_on_approaching(const Estimate& estimate) noexcept;
-  void look_for_way_back() noexcept;
+  bool goes_on_detour(const Estimate& estimate) noexcept;
+  void look_for_detour() noexcept;
+  bool turn_around() noexcept;
+  bool go_back() noexcept;
 
   Setup setup_;
   std::shared_ptr<const Model> vehicle_;
   std::vector<int> held_state_;  ///< n_u: the problem's state that holds an input, or -1
   Path path_;
   PathFollower follower_;
-  std::unique_ptr<Approach> approach_;  ///< to the path, while the vehicle turns around
+  std::unique_ptr<Detour> detour_;  ///< while the vehicle turns around, or goes back
   RhcProblem problem_;
   std::shared_ptr<Solver> solver_;
   GuessShifter shifter_;
   Iterate point_;
   Iterate relaxed_plan_;  ///< that violates hard limits least, while another one is looked for; or a trial of inputs
-  Report relaxed_report_;
   Command command_;
   bool has_plan_ = false, prepared_ = false, is_lost_ = false;
-  bool is_finished_ = true;  ///< the last sample's plan was assessed and kept for the next one
-  bool is_located_ = false;  ///< where the vehicle is on the path is known
+  bool is_finished_ = true, is_located_ = false;  ///< the last plan was assessed; the place on the path is known
   // For which the inputs' bounds were made [m/s].
   double bounded_forwards_ = std::numeric_limits<double>::quiet_NaN(), bounded_in_reverse_ = bounded_forwards_;
   int reference_segment_ = 0;        ///< segment of the path where the last reference began
@@ -182,19 +187,14 @@ class RHEC_EXPORT Controller {
   std::int64_t fallbacks_ = 0;
   std::vector<double> scratch_, straight_, slipless_, largest_, smallest_, limit_values_;
   std::vector<double> nominal_parameters_, reference_parameters_, ahead_parameters_;
-  std::vector<double> excess_now_, excess_ahead_;  ///< over limits of terms: of the vehicle, and on a way back
-  std::vector<double> last_inputs_;                ///< n_u, applied last; NaN: not known
+  std::vector<double> last_inputs_;   ///< n_u, applied last; NaN: not known
   std::vector<std::uint8_t> drives_;  ///< n_u: whether an input moves the vehicle when it drives straight ahead
   std::vector<std::uint8_t> begins_;
   std::vector<Obstacle> obstacles_;  ///< room for as many as the terms regard; the first `obstacle_count_` are there
   std::vector<double> obstacle_distances_;  ///< of these from the plan [m]
   std::size_t obstacle_count_ = 0;
   double pace_ = 1.0, wanted_pace_ = 1.0;  ///< share of the path's speeds
-  // For how long it has stood, looking away, and had when a way back was last looked for; has not moved on on one [s].
-  double standing_ = 0.0, searched_ = 0.0, stalled_ = 0.0;
-  double arc_margin_ = 1.0;  ///< of arcs to turn around on, over the tightest
-  double seen_ = 0.0;        ///< when these were there [s]
-  double now_ = 0.0;         ///< time of the last estimate [s]
+  double seen_ = 0.0, now_ = 0.0;          ///< when the obstacles were there; time of the last estimate [s]
 };
 
 }  // namespace rhec

@@ -11,9 +11,9 @@
 namespace rhec {
 
 enum class Status {
-  solved,      ///< KKT residual within the tolerance
-  step_taken,  ///< the one requested real-time iteration was done
-  relaxed,     ///< a real-time iteration whose linearised hard limits contradict each other: it violates them least
+  solved,           ///< KKT residual within the tolerance
+  step_taken,       ///< the one requested real-time iteration was done
+  relaxed,          ///< real-time iterations found no point that keeps hard limits: this one violates them least
   iteration_limit,  ///< stopped at max_iterations; the best iterate is returned
   deadline,         ///< stopped at the deadline; the best iterate so far is returned
   infeasible,       ///< no point satisfies the constraints, as far as the method can tell
