@@ -42,7 +42,7 @@ struct NloptOptions {
   nlopt_algorithm algorithm = NLOPT_LD_SLSQP;
   nlopt_algorithm local_algorithm = NLOPT_LD_SLSQP;
   double tolerance = 1e-8;
-  int max_iterations = 1000;
+  int max_iterations = 2000;
   int restarts = 50;
   std::optional<int> iterations_per_run;
   bool polish = true;
