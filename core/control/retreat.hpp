@@ -24,8 +24,6 @@ class Retreat {
   /// Moves on with the vehicle, whose heading is off the path's by an angle [rad]. It has ended where the vehicle is
   /// aligned, looks away too far, or the section begins, or it has been driven for as long as it may be.
   void advance(const Path& path, double x, double y, double heading) noexcept;
-  /// Whether it has ended because the vehicle is aligned.
-  bool has_arrived() const noexcept { return has_arrived_; }
   double arc_length() const noexcept { return place_; }  ///< where the vehicle is [m]
   double arc_length_after(double arc_length, double time) const noexcept;
   PathPoint point_at(const Path& path, double arc_length) const noexcept;
@@ -33,7 +31,7 @@ class Retreat {
  private:
   double place_ = 0.0, last_ = 0.0;  ///< [m], and where it ends at the latest
   double speed_ = 0.0;               ///< [m/s]
-  bool is_under_way_ = false, has_arrived_ = false;
+  bool is_under_way_ = false;
 };
 
 }  // namespace rhec

@@ -327,7 +327,6 @@ void GnRti::note_met(const KktResidual& kkt, double objective) noexcept {
   objective += slack_costs(linearisation_->qp(), all_stages(*ocp_));
   if (has_met_ && !(objective < met_objective_)) return;
   met_ = best_;
-  met_violation_ = 0.0;
   met_objective_ = objective;
   has_met_ = true;
 }

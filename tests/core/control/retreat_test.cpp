@@ -35,7 +35,6 @@ TEST(Retreat, IsThePathBackwardsUntilTheVehicleIsAligned) {
     EXPECT_TRUE(retreat.is_under_way()) << "what is no number says nothing";
     retreat.advance(path, 38.3, 0.1, along - 0.01);
     EXPECT_FALSE(retreat.is_under_way());
-    EXPECT_TRUE(retreat.has_arrived());
     EXPECT_NEAR(retreat.arc_length(), 38.3, 1e-9);
   }
 }
@@ -53,11 +52,9 @@ TEST(Retreat, EndsWhereItHelpsNobody) {
   EXPECT_TRUE(retreat.is_under_way()) << "it was less when that began";
   retreat.advance(path, 39.5, 0.5, 2.5);
   EXPECT_FALSE(retreat.is_under_way()) << "it looks away";
-  EXPECT_FALSE(retreat.has_arrived());
   ASSERT_TRUE(retreat.begin(path, 0, 40.0, 0.5, 0.4));
   for (double x = 39.5; x > 25.0; x -= 0.5) retreat.advance(path, x, 0.5, 0.3);
   EXPECT_FALSE(retreat.is_under_way()) << "it has gone back for 20 s";
-  EXPECT_FALSE(retreat.has_arrived());
   EXPECT_EQ(retreat.arc_length_after(3.0, 100.0), 3.0) << "behind its end there is nothing to drive";
 }
 

@@ -3,7 +3,6 @@
 
 #include <unistd.h>
 
-#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <cstring>
@@ -277,14 +276,7 @@ TEST(Ipopt, LimitsWithoutInteriorAreNotLeftTooEarly) {
     if (expected.status != Status::solved) continue;
     ++compared;
     EXPECT_EQ(report.status, Status::solved) << seed;
-    // A violation within the tolerance changes the objective by as much as its multiplier says, and those grow without
-    // bound here: how far is decided by rounding.
-    double largest = 0.0;
-    for (int i = 0; i <= limited.intervals(); ++i)
-      for (int r = 0; r < limited.limit_count(i); ++r)
-        largest = std::max({largest, std::abs(ours.limit_bound(i)[r]), std::abs(theirs.limit_bound(i)[r])});
-    const double violated = report.kkt.bound_violation + expected.kkt.bound_violation;
-    EXPECT_NEAR(report.objective, expected.objective, 1e-6 * (1.0 + expected.objective) + largest * violated) << seed;
+    EXPECT_NEAR(report.objective, expected.objective, 1e-6 * (1.0 + expected.objective)) << seed;
   }
   EXPECT_GE(compared, 35);
 }
