@@ -22,8 +22,9 @@ constexpr double smallest_inner_tolerance = 1e-14;
 /// Relative contribution of the barrier to the objective that is negligible, as a multiple of the tolerance.
 constexpr double negligible_gap = 1.0;
 constexpr int most_spare_iterations = 6;
-/// The same, relative to 1 and the objective, of an iterate that may be far from an optimum whatever its residual says:
-/// where limits leave no interior, multipliers grow without bound, and the residual is relative to them.
+/// The same and that of the constraints' violation, relative to 1 and the objective, of an iterate that may be far from
+/// an optimum whatever its residual says: where limits leave no interior, multipliers grow without bound, and the
+/// residual is relative to them.
 constexpr double clear_gap = 1e-6;
 /// Below this residual another run polishes the best iterate.
 constexpr double near_solution = 1e-4;
@@ -234,8 +235,8 @@ bool IpoptSolver::see(int iteration, const PrimalDual* iterate) noexcept {
     keep_if_better(*iterate);
     if (seen_kkt_.largest() <= options_.tolerance) {
       const double gap = nlp_->complementarity_gap(), size = std::abs(nlp_->objective());
-      if (gap <= negligible_gap * options_.tolerance * size) return false;
-      if (--spare_iterations_ <= 0 && !(gap > clear_gap * (1.0 + size))) return false;
+      const bool is_enough = gap <= negligible_gap * options_.tolerance * size || --spare_iterations_ <= 0;
+      if (is_enough && !(gap + nlp_->violation_gap() > clear_gap * (1.0 + size))) return false;
     }
   }
   stopped_late_ = is_late();

@@ -26,9 +26,10 @@ struct IpoptOptions {
 /// Multiple shooting: all states and controls are variables of one sparse NLP, solved by Ipopt's interior-point filter
 /// method [16] (docs/method.md, section 7).
 ///
-/// Ipopt runs until the core's KKT residual is within the tolerance and the barrier's contribution to the objective is
-/// negligible; Ipopt's own convergence test does not decide. A guess with multipliers is a warm start: its multipliers
-/// tell which bounds are close, and its residual how small the initial barrier parameter may be.
+/// Ipopt runs until the core's KKT residual is within the tolerance, the barrier's contribution to the objective is
+/// negligible, and that of violated constraints small; Ipopt's own convergence test does not decide. A guess with
+/// multipliers is a warm start: its multipliers tell which bounds are close, and its residual how small the initial
+/// barrier parameter may be.
 ///
 /// If a run fails, or has not converged after so many iterations that it probably will not, further runs start from the
 /// guess, in this order: without the guess' multipliers, with the Gauss-Newton instead of the exact Hessian, and with

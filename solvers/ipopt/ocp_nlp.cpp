@@ -300,6 +300,14 @@ double OcpNlp::complementarity_gap() const noexcept {
   return gap;
 }
 
+double OcpNlp::violation_gap() noexcept {
+  if (!evaluate_at(linearised_.z.data(), elsewhere)) return std::numeric_limits<double>::infinity();
+  const std::vector<double>& multipliers = linear_iterate_->multipliers.of_constraints;
+  double gap = 0.0;
+  for (std::size_t row = 0; row < constraints_.size(); ++row) gap += std::abs(multipliers[row] * constraints_[row]);
+  return gap;
+}
+
 bool OcpNlp::get_nlp_info(Ipopt::Index& n, Ipopt::Index& m, Ipopt::Index& jacobian_entries,
                           Ipopt::Index& hessian_entries, IndexStyleEnum& index_style) {
   const Timer timer(microseconds_);

@@ -83,6 +83,8 @@ class OcpNlp final : public Ipopt::TNLP {
   void exchange_assessed(Iterate& iterate) noexcept;
   /// Sum of |bound multiplier| x distance from the bound: the barrier's remaining contribution to the objective.
   double complementarity_gap() const noexcept;
+  /// Sum of |multiplier| x |violation| of the constraints: to first order, how far it takes the objective.
+  double violation_gap() noexcept;
   /// With the costs of slacks.
   double objective() const noexcept { return linear_objective_; }
   /// Time spent in Ipopt's calls of this object since construction [us].
