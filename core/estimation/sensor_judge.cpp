@@ -8,6 +8,7 @@
 #include "innovation.hpp"
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/estimation/input_factors.hpp"
+#include "rhec/core/model/motion_outputs.hpp"
 #include "sensor_judge_parts.hpp"
 
 namespace rhec {
@@ -211,7 +212,7 @@ SensorJudge::SensorJudge(std::shared_ptr<const Model> model, const Setup& setup)
   blind_ = make(blind_setup(*model, setup_));
   memory_ = std::make_unique<Memory>();
   memory_->double_fault = make(filter_setup(setup_));
-  memory_->stuck = StuckValues(setup_.noise.output_variances);
+  memory_->stuck = StuckValues(setup_.noise.output_variances, outputs_of_motion(*model));
   memory_->trial = std::make_unique<WalkingFilter>(model, filter_setup(setup_));
   memory_->ahead = std::make_unique<WalkingFilter>(model, filter_setup(setup_));
   memory_->unplaced = std::make_unique<WalkingFilter>(model, filter_setup(setup_));
@@ -280,6 +281,7 @@ void SensorJudge::reset() noexcept {
   memory_->past->forget();
   memory_->has_advanced = false;
   memory_->offsets->reset();
+  memory_->was_minor.assign(sensors_.size(), 0);
   memory_->whiteness.assign(setup_.whiteness ? sensors_.size() : 0, {});
   memory_->whiteness_of.assign(static_cast<std::size_t>(own_->filter.model().output_count()), nullptr);
   for (std::size_t s = 0; s < memory_->whiteness.size(); ++s)
@@ -596,7 +598,10 @@ SensorJudge::Finding SensorJudge::judge(double time, double* outputs, const doub
   memory_->undisputed_samples = is_disputed_ ? 0 : std::min(memory_->undisputed_samples + counted, setup_.calm);
   for (std::size_t s = 0; s < sensors_.size(); ++s) {
     if (is_open && findings_[s] == reason::rejected) continue;
-    is_calm = is_calm && findings_[s] == 0;
+    // So is a sensor that is off by no more than what is stated of its noise.
+    const bool is_minor = findings_[s] == reason::off && is_minor_offset(s);
+    is_calm = is_calm && (findings_[s] == 0 || (is_minor && memory_->was_minor[s] != 0));
+    memory_->was_minor[s] = is_minor;
     quiet_[s] = findings_[s] ? 0 : quiet_[s] + is_expected(s);
     if (findings_[s]) states_[s].reasons = findings_[s] | (states_[s].reasons & reason::moved);
   }
@@ -649,6 +654,16 @@ void SensorJudge::note_offsets() noexcept {
     off_input_ = static_cast<int>(j);
     input_findings_ |= reason::off;
   }
+}
+
+/// Whether all that a sensor is off by, to be taken out, is within the noise that is stated of it.
+bool SensorJudge::is_minor_offset(std::size_t sensor) const noexcept {
+  const SensorHealth& state = states_[sensor];
+  if (state.offset == 0.0 || state.rival >= 0) return false;
+  return std::ranges::all_of(sensors_[sensor].outputs, [&](int j) {
+    const double offset = memory_->offsets->offset(j);
+    return offset * offset <= setup_.noise.output_variances[static_cast<std::size_t>(j)];
+  });
 }
 
 /// What is expected of the outputs, now that they have been used; after a small step, to first order.

@@ -87,6 +87,7 @@ class SensorJudge {
   void note_sample(double time, const double* outputs) noexcept;
   void note_motion(double duration, const double* inputs) noexcept;
   void note_offsets() noexcept;
+  bool is_minor_offset(std::size_t sensor) const noexcept;
   void note_corrected(bool has_jumped) noexcept;
   void remember(double time, const double* outputs) noexcept;
   void forget_reasons() noexcept;

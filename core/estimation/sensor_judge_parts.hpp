@@ -122,9 +122,10 @@ struct SensorJudge::Memory {
   Eigen::VectorXd before_mean;
   Eigen::MatrixXd before_covariance;
   double duration = 0.0;
-  bool has_advanced = false;   ///< since the last samples
-  bool was_calm = true;        ///< health was ok when the dispute began, and there had been none for some time
-  bool was_input_off = false;  ///< a measured input was, at the last sample
+  bool has_advanced = false;            ///< since the last samples
+  bool was_calm = true;                 ///< health was ok when the dispute began, and there had been none for some time
+  bool was_input_off = false;           ///< a measured input was, at the last sample
+  std::vector<std::uint8_t> was_minor;  ///< a sensor was off by no more than its noise, likewise
   bool was_open = false;       ///< what was disputed at the last sample was probably slip, and nothing was said of it
   int undisputed_samples = 0;  ///< in a row
   bool is_counted = true;      ///< the last sample has a position, or was to have one; true where there are none

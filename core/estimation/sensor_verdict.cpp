@@ -193,7 +193,8 @@ void SensorJudge::assess(const Estimate& estimate, std::span<const Presence> pre
   for (std::size_t s = 0; s < sensors_.size(); ++s) {
     if (presence[s] == Presence::silent) health.sensors[s].reasons |= reason::silent;
     is_overdue = is_overdue || presence[s] != Presence::present;
-    has_finding = has_finding || health.sensors[s].reasons != 0;
+    const std::uint32_t minor = memory_->was_minor[s] != 0 ? reason::off : 0u;
+    has_finding = has_finding || (health.sensors[s].reasons & ~minor) != 0;
   }
   const Roles& roles = own_->filter.model().description().roles;
   const Eigen::MatrixXd& P = estimate.covariance;

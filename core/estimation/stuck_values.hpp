@@ -12,22 +12,28 @@ namespace rhec {
 class StuckValues {
  public:
   StuckValues() = default;
-  explicit StuckValues(const std::vector<double>& variances) {
+  /// `motion_outputs`: that depend on inputs.
+  explicit StuckValues(const std::vector<double>& variances, const std::vector<int>& motion_outputs = {}) {
     for (const double variance : variances) outputs_.push_back({.sigma = std::sqrt(variance)});
+    for (const int output : motion_outputs) outputs_[static_cast<std::size_t>(output)].is_of_motion = true;
   }
   void reset() noexcept {
-    for (Output& each : outputs_) each = {.sigma = each.sigma};
+    for (Output& each : outputs_) each = {.sigma = each.sigma, .is_of_motion = each.is_of_motion};
   }
   /// A measured value (NaN: none), and what was expected before it was used.
   void take(std::size_t output, double value, double expected) noexcept {
     Output& each = outputs_[output];
     // What the vehicle's motion has added since the last sample, by its own: angles change by little in a sample. It
     // does so in samples that have values of other sensors alone, too.
-    if (!std::isnan(each.corrected)) each.movement += expected - each.corrected;
+    if (each.is_of_motion)
+      each.movement = expected - each.first_expected;
+    else if (!std::isnan(each.corrected))
+      each.movement += expected - each.corrected;
     if (std::isnan(value)) return;
     ++each.values;
     if (value != each.last) {
       each.last = value;
+      each.first_expected = expected;
       each.repeats = 0;
       each.movement = 0.0;
       return;
@@ -49,8 +55,10 @@ class StuckValues {
  private:
   struct Output {
     double sigma = 0.0;
+    bool is_of_motion = false;
     double last = std::numeric_limits<double>::quiet_NaN();
     double corrected = std::numeric_limits<double>::quiet_NaN(), movement = 0.0;
+    double first_expected = 0.0;  ///< where the value that it repeats came first
     int repeats = 0;
     long values = 0, all_repeats = 0;
   };

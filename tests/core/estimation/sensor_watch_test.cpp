@@ -185,5 +185,60 @@ TEST(SensorWatch, TakesOutWhatASpeedIsOffByWhoseSlipIsKnown) {
   }
 }
 
+/// A sensor that is off by what its noise may be is as good as it is said to be.
+TEST(SensorWatch, AnOffsetWithinTheNoiseThatIsStatedIsSaidAndDegradesNothing) {
+  const auto model = host().make_model("bicycle_slip");
+  const double sigma = 0.02;
+  for (const double off : {0.8 * sigma, 2.0 * sigma}) {
+    SCOPED_TRACE(off);
+    const SensorWatch::Setup setup{.noise = {.output_variances = {1e-4, 1e-4, sigma * sigma},
+                                             .input_variances = {1e-4, 1e-4},
+                                             .parameter_lower = {0.0, 0.0},
+                                             .parameter_upper = {1.0, 1.0}},
+                                   .walk = {0.0, 0.0},
+                                   .parameter_sigmas = {1e-3, 1e-3}};
+    SensorWatch watch(model, setup);
+    Eigen::VectorXd mean = Eigen::VectorXd::Zero(6);
+    mean.tail(2) << 0.75, 0.8;
+    Eigen::MatrixXd covariance = 1e-3 * Eigen::MatrixXd::Identity(6, 6);
+    covariance(4, 4) = covariance(5, 5) = 1e-6;
+    watch.restart(mean, covariance);
+    std::mt19937_64 random(5);
+    std::normal_distribution<double> normal;
+    std::vector<double> state(4, 0.0), next(4), outputs(3);
+    const double parameters[] = {0.75, 0.8}, duration = 0.2;
+    Estimate estimate;
+    Health health;
+    HealthLevel when_found = HealthLevel::ok;
+    for (int k = 1; k <= 200; ++k) {
+      const double inputs[] = {3.0, 0.2 * std::cos(0.1 * k)};
+      model->integrate({.count = 1,
+                        .states = state.data(),
+                        .inputs = inputs,
+                        .parameters = parameters,
+                        .durations = &duration,
+                        .next_states = next.data()});
+      state = next;
+      watch.advance(duration, inputs);
+      model->observe({.count = 1, .states = state.data(), .outputs = outputs.data()});
+      for (std::size_t j = 0; j < outputs.size(); ++j) {
+        outputs[j] += 0.3 * std::sqrt(setup.noise.output_variances[j]) * normal(random);
+        if (j == 2) outputs[j] += off;
+      }
+      watch.judge(0.2 * k, outputs.data());
+      const bool was_off = !health.sensors.empty() && health.sensors.back().reasons != 0;
+      estimate.covariance = watch.covariance();
+      watch.assess(estimate, std::vector(2, SensorWatch::Presence::present), SensorWatch::Presence::present, 0, health);
+      if (health.sensors.back().reasons != 0 && !was_off) when_found = health.level;
+    }
+    ASSERT_EQ(health.sensors.size(), 2u);
+    EXPECT_EQ(health.sensors.back().reasons, reason::off);
+    EXPECT_NEAR(health.sensors.back().offset, off, 0.3 * off);
+    EXPECT_EQ(when_found, HealthLevel::degraded);
+    EXPECT_EQ(health.level, off < sigma ? HealthLevel::ok : HealthLevel::degraded);
+    EXPECT_THAT(watch.in_words(health), ::testing::HasSubstr(": delta off by about 0.0"));
+  }
+}
+
 }  // namespace sensor_watch_test
 }  // namespace rhec

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <random>
+#include <vector>
 
 namespace rhec {
 namespace stuck_values_test {
@@ -63,6 +64,31 @@ TEST_F(OneOutput, TheVehicleMovesInSamplesOfOtherSensorsToo) {
     measure(6.0, 0.001);
   }
   EXPECT_TRUE(values.is_stuck(0));
+}
+
+// A steering angle that is an input, measured with coarse steps: the input is always a little ahead of the angle, and
+// the estimate is drawn back to the angle in each sample.
+TEST(OutputOfMotion, ThatIsAlwaysBehindIsNotStuck) {
+  for (const bool is_of_motion : {true, false}) {
+    StuckValues values({0.01}, is_of_motion ? std::vector<int>{0} : std::vector<int>{});
+    for (int k = 0; k < 5; ++k) {
+      const double expected = 1.0 + 0.01 * k;
+      values.take(0, 0.9, expected);
+      values.corrected(0, expected - 0.1);
+    }
+    // A state that returned so far in each sample would be drawn there by the value that is stuck.
+    EXPECT_EQ(values.is_stuck(0), !is_of_motion);
+  }
+}
+
+TEST(OutputOfMotion, ThatRepeatsItselfWhileInputsChangeIsStuck) {
+  StuckValues values({0.01}, {0});
+  for (int k = 0; k < 3; ++k) values.take(0, 0.9, 1.0 + 0.2 * k);
+  EXPECT_FALSE(values.is_stuck(0));
+  values.take(0, 0.9, 1.6);
+  EXPECT_TRUE(values.is_stuck(0));
+  values.reset();
+  EXPECT_FALSE(values.is_stuck(0));
 }
 
 }  // namespace stuck_values_test
