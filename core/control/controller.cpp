@@ -24,6 +24,9 @@ namespace {
 constexpr double known_heading = 0.5;
 // A vehicle that is beyond hard limits is no faster than its reference by more than this factor.
 constexpr double most_haste = 1.25;
+/// A sum of violations of hard limits that is none; by how much the price of violations rises from sample to sample,
+/// and how high it becomes, relative to the objective.
+constexpr double violated = 1e-4, price_rise = 1.5, highest_price = 1e3;
 
 bool is_finite(const Obstacle& it) noexcept {
   const double numbers[] = {it.x,       it.y,          it.semi_axis_along, it.semi_axis_across,
@@ -188,6 +191,7 @@ void Controller::reset() noexcept {
   is_finished_ = true;
   fallbacks_ = 0;
   command_.report = {};
+  problem_.terms().set_price(std::numeric_limits<double>::infinity());
   obstacle_count_ = 0;
   pace_ = wanted_pace_ = 1.0;
   std::fill(last_inputs_.begin(), last_inputs_.end(), std::numeric_limits<double>::quiet_NaN());
@@ -519,6 +523,36 @@ bool Controller::find_better(bool is_found, void (Controller::*start)() noexcept
   return is_better || is_found;
 }
 
+/// Where hard limits cannot be kept, as outside a corridor, their violation has a price, an l1 penalty (Nocedal &
+/// Wright 2006, section 17.2), until a plan keeps them: a vehicle that a solver has no plan for does not come back. A
+/// low price leads to better minima; it rises until it is an exact one.
+bool Controller::find_at_a_price(bool is_found, Clock::time_point deadline) noexcept {
+  if (limit_values_.empty()) return is_found;
+  HorizonTerms& terms = problem_.terms();
+  const auto rest_of_objective = [&](double violations) {
+    const double rest = std::abs(command_.report.objective - violations);
+    return std::isfinite(rest) ? rest : 0.0;
+  };
+  if (std::isinf(terms.price())) {
+    const Status status = command_.report.status;
+    const bool is_answer = status == Status::solved || status == Status::step_taken || status == Status::relaxed;
+    if (is_answer || status == Status::bad_input || (is_found && plan_violation() <= violated)) return is_found;
+    terms.set_price(1.0 + rest_of_objective(0.0));
+    if (is_found || std::isinf(terms.price()) || Clock::now() >= deadline) return is_found;
+    start_cold();
+    is_found = find_plan(deadline);
+    command_.report.fallback_used = true;
+  }
+  if (!is_found) return false;
+  const double violation = plan_violation(), price = terms.price();
+  const bool keeps_limits = violation <= violated;
+  if (!keeps_limits) command_.report.status = Status::relaxed;
+  const double most = highest_price * (1.0 + rest_of_objective(price * violation));
+  terms.set_price(keeps_limits ? std::numeric_limits<double>::infinity()
+                               : std::max(price, std::min(price_rise * price, most)));
+  return true;
+}
+
 /// What is applied keeps the bounds, whatever a solver says.
 void Controller::keep_within_bounds() noexcept {
   for (std::size_t k = 0; k < command_.inputs.size(); ++k) {
@@ -589,6 +623,7 @@ const Controller::Command& Controller::control(const Estimate& estimate, Clock::
     // Straight ahead leads over limits, to where no plan may be near that keeps them.
     is_found = find_better(is_found, &Controller::start_at_rest, deadline);
   }
+  is_found = find_at_a_price(is_found, deadline);
   command_.fallback = !is_found;
   fallbacks_ += command_.fallback;
   prepared_ = false;
@@ -635,9 +670,9 @@ double Controller::plan_violation() noexcept {
   for (int i = 0; i <= problem_.intervals(); ++i) {
     const double* const values =
         limit_values_.data() + static_cast<std::ptrdiff_t>(i) * problem_.capacity().limit_row();
-    const double *lower = problem_.limit_lower(i), *upper = problem_.limit_upper(i), *price = problem_.limit_linear(i);
+    const double *lower = problem_.limit_lower(i), *upper = problem_.limit_upper(i);
     for (int r = 0; r < problem_.limit_count(i); ++r)
-      if (std::isinf(price[r])) sum += std::max({0.0, lower[r] - values[r], values[r] - upper[r]});
+      if (problem_.is_hard_limit(i, r)) sum += std::max({0.0, lower[r] - values[r], values[r] - upper[r]});
   }
   return sum;
 }

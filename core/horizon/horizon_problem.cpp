@@ -123,7 +123,7 @@ int HorizonProblem::first_limit(int stage) const noexcept {
 }
 
 const double* HorizonProblem::limit_linear(int stage) const noexcept {
-  return terms_.functions() ? terms_.functions()->linear() + first_limit(stage) : nullptr;
+  return terms_.functions() ? terms_.linear() + first_limit(stage) : nullptr;
 }
 
 const double* HorizonProblem::limit_quadratic(int stage) const noexcept {

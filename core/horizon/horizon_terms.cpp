@@ -45,6 +45,7 @@ HorizonTerms::HorizonTerms(std::shared_ptr<const TermFunctions> functions, const
   if (!functions_) return;
   const auto nodes = static_cast<std::size_t>(max_intervals) + 1;
   limits_ = functions_->limit_count();
+  linear_.assign(functions_->linear(), functions_->linear() + limits_);
   data_row_ = functions_->data_count();
   data_.assign(nodes * data_row_, 0.0);
   lower_.assign(nodes * limits_, -infinity);
@@ -56,6 +57,17 @@ HorizonTerms::HorizonTerms(std::shared_ptr<const TermFunctions> functions, const
     most_rows_ = std::max(most_rows_, static_cast<std::size_t>(rows.count()));
     most_slopes_ = std::max(most_slopes_, rows.slopes.size());
     most_bends_ = std::max(most_bends_, rows.bends.size());
+  }
+}
+
+bool HorizonTerms::is_hard(int limit) const noexcept { return std::isinf(functions_->linear()[limit]); }
+
+void HorizonTerms::set_price(double price) noexcept {
+  price_ = infinity;
+  for (int limit = 0; limit < static_cast<int>(linear_.size()); ++limit) {
+    if (!is_hard(limit)) continue;
+    linear_[static_cast<std::size_t>(limit)] = price;
+    price_ = price;
   }
 }
 
@@ -189,8 +201,7 @@ void HorizonTerms::write_limit_counts(const Horizon& horizon, StageRange range, 
 
 /// The bounds of limits, of which the upper ones have the values at first, and their prices.
 void HorizonTerms::complete_limits(const TermFunctions::Rows& rows, StageRange stages, StageQp& qp) const noexcept {
-  const double *linear = functions_->linear() + rows.first_limit,
-               *quadratic = functions_->quadratic() + rows.first_limit;
+  const double *linear = linear_.data() + rows.first_limit, *quadratic = functions_->quadratic() + rows.first_limit;
   for (int i = stages.first; i <= stages.last; ++i) {
     const double *least = lower(i) + rows.first_limit, *most = upper(i) + rows.first_limit;
     double *to_lower = qp.limit_lower(i), *to_upper = qp.limit_upper(i);

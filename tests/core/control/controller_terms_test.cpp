@@ -292,6 +292,31 @@ TEST(ControllerTerms, ThatAreHardAndCannotBeKeptAreViolatedLeast) {
   }
 }
 
+TEST(ControllerTerms, ThatAreHardAndCannotBeKeptHaveAPriceWithAnySolver) {
+  for (const std::string solver : {"sparse_sqp", "ipopt", "nlopt", "gn_rti, mode: converge"}) {
+    for (const double aside : {1.5, -2.5}) {
+      SCOPED_TRACE(solver);
+      Drive drive("horizon: 10, terms: [{name: corridor, left: 1, right: 1, hard: true}], solver: {name: " + solver +
+                  "}");
+      for (int k = 0; k < 10; ++k) EXPECT_FALSE(drive.advance().fallback);
+      drive.now.state[1] += aside;
+      drive.now.state[2] += aside > 0.0 ? 0.2 : -0.2;
+      int relaxed = 0, outside = 0, fallbacks = 0;
+      for (int k = 0; k < 40; ++k) {
+        const Controller::Command& command = drive.advance();
+        fallbacks += command.fallback;
+        relaxed += command.report.status == Status::relaxed;
+        outside += std::abs(drive.now.state[1]) > 1.0 + 1e-3;
+      }
+      EXPECT_EQ(fallbacks, 0);
+      EXPECT_GT(relaxed, 0) << aside;
+      EXPECT_LT(outside, 12) << aside;
+      EXPECT_LT(std::abs(drive.now.state[1]), 0.3) << aside;
+      EXPECT_EQ(drive.advance().report.status, Status::solved) << aside;
+    }
+  }
+}
+
 TEST(ControllerTerms, AreReadOneByOneAndRefusedInWords) {
   const auto refused = [](const std::string& section) { return error_of([&] { Drive drive(section); }); };
   EXPECT_THAT(refused("terms: {name: corridor}"), HasSubstr("controller.terms: found a map, expected a list of terms"));

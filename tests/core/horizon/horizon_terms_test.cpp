@@ -270,6 +270,32 @@ TEST(HorizonTerms, MultipliersMoveAlongWithTheHorizon) {
   EXPECT_EQ(point.limit_bound(1)[0], 0.0) << "there is no upper bound";
 }
 
+TEST(HorizonTerms, HardLimitsMayHaveAPriceForSomeTime) {
+  const auto problem = make_problem(Layers::none);
+  const auto weights = [&](int stage) {
+    const double* const linear = problem->limit_linear(stage);
+    return std::vector(linear, linear + problem->limit_count(stage));
+  };
+  const auto of_qp = [&](int stage) {
+    StageQp qp(problem->capacity());
+    std::vector<double> scratch(problem->scratch_size());
+    problem->linearise(all_stages(*problem), scattered_point(*problem), Hessian::none, qp, scratch);
+    return std::vector(qp.limit_linear(stage), qp.limit_linear(stage) + qp.limits(stage));
+  };
+  ASSERT_THAT(weights(1), ElementsAre(3.0, infinity));  // sorted: limits of states first
+  for (const double price : {7.0, 700.0}) {
+    problem->terms().set_price(price);
+    EXPECT_EQ(problem->terms().price(), price);
+    EXPECT_THAT(weights(1), ElementsAre(3.0, price));
+    EXPECT_THAT(of_qp(1), ElementsAre(3.0, price));
+    EXPECT_FALSE(problem->is_hard_limit(1, 0));
+    EXPECT_TRUE(problem->is_hard_limit(1, 1));
+  }
+  problem->terms().set_price(infinity);
+  EXPECT_EQ(problem->terms().price(), infinity);
+  EXPECT_THAT(of_qp(1), ElementsAre(3.0, infinity));
+}
+
 TEST(HorizonTerms, DataAreTakenFromAnotherProblem) {
   const auto from = make_problem(Layers::none), to = make_problem(Layers::none);
   from->terms().place(3, {.time = 7.0});

@@ -150,6 +150,7 @@ class RHEC_EXPORT Controller {
   void keep_within_bounds() noexcept;
   bool find_plan(Clock::time_point deadline) noexcept;
   bool find_better(bool is_found, void (Controller::*start)() noexcept, Clock::time_point deadline) noexcept;
+  bool find_at_a_price(bool is_found, Clock::time_point deadline) noexcept;
   double plan_violation() noexcept;
   double distance_from_plan(const Obstacle& obstacle) const noexcept;
   bool plans_to_stand(int intervals) const noexcept;
@@ -187,9 +188,8 @@ class RHEC_EXPORT Controller {
   std::int64_t fallbacks_ = 0;
   std::vector<double> scratch_, straight_, slipless_, largest_, smallest_, limit_values_;
   std::vector<double> nominal_parameters_, reference_parameters_, ahead_parameters_;
-  std::vector<double> last_inputs_;   ///< n_u, applied last; NaN: not known
-  std::vector<std::uint8_t> drives_;  ///< n_u: whether an input moves the vehicle when it drives straight ahead
-  std::vector<std::uint8_t> begins_;
+  std::vector<double> last_inputs_;            ///< n_u, applied last; NaN: not known
+  std::vector<std::uint8_t> begins_, drives_;  ///< n_u: whether an input moves the vehicle that drives straight ahead
   std::vector<Obstacle> obstacles_;  ///< room for as many as the terms regard; the first `obstacle_count_` are there
   std::vector<double> obstacle_distances_;  ///< of these from the plan [m]
   std::size_t obstacle_count_ = 0;

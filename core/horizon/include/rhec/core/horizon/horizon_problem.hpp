@@ -62,6 +62,8 @@ class RHEC_EXPORT HorizonProblem : public Ocp {
   const double* limit_upper(int stage) const noexcept override { return terms_.upper(stage) + first_limit(stage); }
   const double* limit_linear(int stage) const noexcept override;
   const double* limit_quadratic(int stage) const noexcept override;
+  /// Whether a limit was stated as hard, also where it has a price (HorizonTerms::set_price).
+  bool is_hard_limit(int stage, int limit) const noexcept { return terms_.is_hard(first_limit(stage) + limit); }
   void evaluate_limits(const Iterate& iterate, double* values, std::span<double> scratch) const noexcept override;
   void mark_limits(int stage, std::uint8_t* state_flags, std::uint8_t* control_flags) const noexcept override;
   bool has_second_derivatives() const noexcept override { return model_->has_second_derivatives(); }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <limits>
 #include <memory>
 #include <span>
 #include <vector>
@@ -31,6 +32,11 @@ class RHEC_EXPORT HorizonTerms {
   const TermFunctions* functions() const noexcept { return functions_.get(); }
   bool has_limits() const noexcept { return limits_ > 0; }
   bool has_residuals() const noexcept { return functions_ && functions_->has_residuals(); }
+  /// What hard limits cost by the unit that they are violated by, in place of infinity. Infinity makes them hard again.
+  void set_price(double price) noexcept;
+  double price() const noexcept { return price_; }  ///< infinity also where no limit is hard
+  bool is_hard(int limit) const noexcept;           ///< as it was stated
+  const double* linear() const noexcept { return linear_.data(); }
 
   /// Lets the terms write the data and bounds of a node.
   void place(int node, const TermPlace& place) noexcept;
@@ -86,6 +92,8 @@ class RHEC_EXPORT HorizonTerms {
   void write_moved_slopes(const Horizon& horizon, TermFunctions::Stage stage, StageRange stages,
                           const double* arguments, StageQp& qp, double* scratch) const noexcept;
 
+  double price_ = std::numeric_limits<double>::infinity();
+  std::vector<double> linear_;  ///< weights of slacks; of hard limits infinity, or their price
   std::shared_ptr<const TermFunctions> functions_;
   int nx_ = 0, np_ = 0, nu_ = 0, limits_ = 0, data_row_ = 0;
   std::size_t most_rows_ = 0, most_slopes_ = 0, most_bends_ = 0;

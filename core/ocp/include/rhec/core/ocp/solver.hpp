@@ -13,7 +13,8 @@ namespace rhec {
 enum class Status {
   solved,           ///< KKT residual within the tolerance
   step_taken,       ///< the one requested real-time iteration was done
-  relaxed,          ///< real-time iterations found no point that keeps hard limits: this one violates them least
+  relaxed,          ///< no point was found that keeps hard limits: this one violates them least (real-time iterations,
+                    ///< and controllers)
   iteration_limit,  ///< stopped at max_iterations; the best iterate is returned
   deadline,         ///< stopped at the deadline; the best iterate so far is returned
   infeasible,       ///< no point satisfies the constraints, as far as the method can tell
