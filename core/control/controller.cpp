@@ -546,7 +546,9 @@ bool Controller::find_at_a_price(bool is_found, Clock::time_point deadline) noex
   if (!is_found) return false;
   const double violation = plan_violation(), price = terms.price();
   const bool keeps_limits = violation <= violated;
-  if (!keeps_limits) command_.report.status = Status::relaxed;
+  const Status status = command_.report.status;
+  const bool is_done = status == Status::solved || status == Status::step_taken;
+  if (!keeps_limits && is_done) command_.report.status = Status::relaxed;
   const double most = highest_price * (1.0 + rest_of_objective(price * violation));
   terms.set_price(keeps_limits ? std::numeric_limits<double>::infinity()
                                : std::max(price, std::min(price_rise * price, most)));
