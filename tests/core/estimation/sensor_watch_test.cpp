@@ -4,10 +4,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <memory>
 #include <random>
 #include <string>
 #include <vector>
@@ -126,109 +128,100 @@ TEST(SensorWatch, JudgesFromTheFirstEstimateOn) {
   EXPECT_FALSE(watch.is_active());
 }
 
-/// Of a speed slip takes a share; where that share is known, and stays as it is, the speed itself may be off.
-TEST(SensorWatch, TakesOutWhatASpeedIsOffByWhoseSlipIsKnown) {
-  const auto model = host().make_model("bicycle_slip");
-  for (const double most_kappa : {0.75, 1.0}) {
-    SensorWatch::Setup setup{.noise = {.output_variances = {9e-4, 9e-4, 3e-4},
-                                       .input_variances = {0.01, 0.01},
-                                       .parameter_lower = {0.75, 0.0},
-                                       .parameter_upper = {most_kappa, 1.0}},
-                             .walk = {0.0, 0.03},
-                             .parameter_sigmas = {1e-3, 0.3}};
-    SensorWatch watch(model, setup);
+/// A bicycle whose slip is known well, watched on a winding drive.
+struct WatchedBicycle {
+  explicit WatchedBicycle(const SensorWatch::Setup& its_setup) : setup(its_setup), watch(model, setup) {
     Eigen::VectorXd mean = Eigen::VectorXd::Zero(6);
     mean.tail(2) << 0.75, 0.8;
     Eigen::MatrixXd covariance = 1e-3 * Eigen::MatrixXd::Identity(6, 6);
-    covariance(4, 4) = 1e-6;
+    for (int j = 0; j < 2; ++j) {
+      const double sigma = setup.parameter_sigmas[static_cast<std::size_t>(j)];
+      covariance(4 + j, 4 + j) = std::min(1e-3, sigma * sigma);
+    }
     watch.restart(mean, covariance);
-    std::mt19937_64 random(5);
-    std::normal_distribution<double> normal;
-    std::vector<double> state(4, 0.0), next(4), outputs(3);
-    const double parameters[] = {0.75, 0.8}, off = 0.5, duration = 0.2;
-    double corrected = 0.0;
-    Estimate estimate;
-    Health health;
+  }
+  /// A sample with a speed and a steering angle that are off by so much; the outputs have a share of their noise.
+  void advance(double speed_off, double angle_off, double noise_share) {
+    const double inputs[] = {3.0, 0.2 * std::cos(0.1 * ++samples)};
+    const double parameters[] = {0.75, 0.8}, duration = 0.2;
+    model->integrate({.count = 1,
+                      .states = state.data(),
+                      .inputs = inputs,
+                      .parameters = parameters,
+                      .durations = &duration,
+                      .next_states = next.data()});
+    state = next;
+    double measured[] = {inputs[0] + speed_off, inputs[1]};
+    watch.clean_inputs(measured);
+    corrected = inputs[0] + speed_off - measured[0];
+    watch.advance(duration, measured);
+    model->observe({.count = 1, .states = state.data(), .outputs = outputs.data()});
+    for (std::size_t j = 0; j < outputs.size(); ++j)
+      outputs[j] += noise_share * std::sqrt(setup.noise.output_variances[j]) * normal(random);
+    outputs[2] += angle_off;
+    watch.judge(duration * samples, outputs.data());
+    estimate.covariance = watch.covariance();
+    watch.assess(estimate, std::vector(2, SensorWatch::Presence::present), SensorWatch::Presence::present, 0, health);
+  }
+
+  std::shared_ptr<const Model> model = host().make_model("bicycle_slip");
+  SensorWatch::Setup setup;
+  SensorWatch watch;
+  std::mt19937_64 random{5};
+  std::normal_distribution<double> normal;
+  std::vector<double> state = std::vector(4, 0.0), next = state, outputs = std::vector(3, 0.0);
+  int samples = 0;
+  double corrected = 0.0;  ///< taken out of the speed
+  Estimate estimate;
+  Health health;
+};
+
+/// Of a speed slip takes a share; where that share is known, and stays as it is, the speed itself may be off.
+TEST(SensorWatch, TakesOutWhatASpeedIsOffByWhoseSlipIsKnown) {
+  for (const double most_kappa : {0.75, 1.0}) {
+    WatchedBicycle bicycle({.noise = {.output_variances = {9e-4, 9e-4, 3e-4},
+                                      .input_variances = {0.01, 0.01},
+                                      .parameter_lower = {0.75, 0.0},
+                                      .parameter_upper = {most_kappa, 1.0}},
+                            .walk = {0.0, 0.03},
+                            .parameter_sigmas = {1e-3, 0.3}});
+    const double off = 0.5;
+    const Health& health = bicycle.health;
     HealthLevel when_found = HealthLevel::ok;
     for (int k = 1; k <= 150; ++k) {
-      const double inputs[] = {3.0, 0.2 * std::cos(0.1 * k)};
-      model->integrate({.count = 1,
-                        .states = state.data(),
-                        .inputs = inputs,
-                        .parameters = parameters,
-                        .durations = &duration,
-                        .next_states = next.data()});
-      state = next;
-      double measured[] = {inputs[0] + off, inputs[1]};
-      watch.clean_inputs(measured);
-      corrected = inputs[0] + off - measured[0];
-      watch.advance(duration, measured);
-      model->observe({.count = 1, .states = state.data(), .outputs = outputs.data()});
-      for (std::size_t j = 0; j < outputs.size(); ++j)
-        outputs[j] += std::sqrt(setup.noise.output_variances[j]) * normal(random);
-      watch.judge(0.2 * k, outputs.data());
       const bool was_off = health.off_input >= 0;
-      estimate.covariance = watch.covariance();
-      watch.assess(estimate, std::vector(2, SensorWatch::Presence::present), SensorWatch::Presence::present, 0, health);
+      bicycle.advance(off, 0.0, 1.0);
       if (health.off_input == 0 && !was_off) when_found = health.level;
     }
     EXPECT_EQ(health.level, HealthLevel::ok);
     if (most_kappa > 0.75) {
-      EXPECT_EQ(corrected, 0.0);
+      EXPECT_EQ(bicycle.corrected, 0.0);
       EXPECT_EQ(health.inputs.reasons, 0u);
     } else {
-      EXPECT_NEAR(corrected, off, 0.1);
+      EXPECT_NEAR(bicycle.corrected, off, 0.1);
       EXPECT_EQ(when_found, HealthLevel::degraded);  // until then something else was said of it
       EXPECT_EQ(health.inputs.reasons, reason::off);
-      EXPECT_THAT(watch.in_words(health), ::testing::StartsWith("ok: input u1 off by about 0."));
+      EXPECT_THAT(bicycle.watch.in_words(health), ::testing::StartsWith("ok: input u1 off by about 0."));
     }
   }
 }
 
 /// A sensor that is off by what its noise may be is as good as it is said to be.
 TEST(SensorWatch, AnOffsetWithinTheNoiseThatIsStatedIsSaidAndDegradesNothing) {
-  const auto model = host().make_model("bicycle_slip");
   const double sigma = 0.02;
   for (const double off : {0.8 * sigma, 2.0 * sigma}) {
     SCOPED_TRACE(off);
-    const SensorWatch::Setup setup{.noise = {.output_variances = {1e-4, 1e-4, sigma * sigma},
-                                             .input_variances = {1e-4, 1e-4},
-                                             .parameter_lower = {0.0, 0.0},
-                                             .parameter_upper = {1.0, 1.0}},
-                                   .walk = {0.0, 0.0},
-                                   .parameter_sigmas = {1e-3, 1e-3}};
-    SensorWatch watch(model, setup);
-    Eigen::VectorXd mean = Eigen::VectorXd::Zero(6);
-    mean.tail(2) << 0.75, 0.8;
-    Eigen::MatrixXd covariance = 1e-3 * Eigen::MatrixXd::Identity(6, 6);
-    covariance(4, 4) = covariance(5, 5) = 1e-6;
-    watch.restart(mean, covariance);
-    std::mt19937_64 random(5);
-    std::normal_distribution<double> normal;
-    std::vector<double> state(4, 0.0), next(4), outputs(3);
-    const double parameters[] = {0.75, 0.8}, duration = 0.2;
-    Estimate estimate;
-    Health health;
+    WatchedBicycle bicycle({.noise = {.output_variances = {1e-4, 1e-4, sigma * sigma},
+                                      .input_variances = {1e-4, 1e-4},
+                                      .parameter_lower = {0.0, 0.0},
+                                      .parameter_upper = {1.0, 1.0}},
+                            .walk = {0.0, 0.0},
+                            .parameter_sigmas = {1e-3, 1e-3}});
+    const Health& health = bicycle.health;
     HealthLevel when_found = HealthLevel::ok;
     for (int k = 1; k <= 200; ++k) {
-      const double inputs[] = {3.0, 0.2 * std::cos(0.1 * k)};
-      model->integrate({.count = 1,
-                        .states = state.data(),
-                        .inputs = inputs,
-                        .parameters = parameters,
-                        .durations = &duration,
-                        .next_states = next.data()});
-      state = next;
-      watch.advance(duration, inputs);
-      model->observe({.count = 1, .states = state.data(), .outputs = outputs.data()});
-      for (std::size_t j = 0; j < outputs.size(); ++j) {
-        outputs[j] += 0.3 * std::sqrt(setup.noise.output_variances[j]) * normal(random);
-        if (j == 2) outputs[j] += off;
-      }
-      watch.judge(0.2 * k, outputs.data());
       const bool was_off = !health.sensors.empty() && health.sensors.back().reasons != 0;
-      estimate.covariance = watch.covariance();
-      watch.assess(estimate, std::vector(2, SensorWatch::Presence::present), SensorWatch::Presence::present, 0, health);
+      bicycle.advance(0.0, off, 0.3);
       if (health.sensors.back().reasons != 0 && !was_off) when_found = health.level;
     }
     ASSERT_EQ(health.sensors.size(), 2u);
@@ -236,7 +229,7 @@ TEST(SensorWatch, AnOffsetWithinTheNoiseThatIsStatedIsSaidAndDegradesNothing) {
     EXPECT_NEAR(health.sensors.back().offset, off, 0.3 * off);
     EXPECT_EQ(when_found, HealthLevel::degraded);
     EXPECT_EQ(health.level, off < sigma ? HealthLevel::ok : HealthLevel::degraded);
-    EXPECT_THAT(watch.in_words(health), ::testing::HasSubstr(": delta off by about 0.0"));
+    EXPECT_THAT(bicycle.watch.in_words(health), ::testing::HasSubstr(": delta off by about 0.0"));
   }
 }
 
