@@ -24,8 +24,8 @@ namespace {
 constexpr double known_heading = 0.5;
 // A vehicle that is beyond hard limits is no faster than its reference by more than this factor.
 constexpr double most_haste = 1.25;
-/// A sum of violations of hard limits that is none; by how much the price of violations rises from sample to sample,
-/// and how high it becomes, relative to the objective.
+// A sum of violations of hard limits that is none; by how much the price of violations rises from sample to sample, and
+// how high it becomes, relative to the objective.
 constexpr double violated = 1e-4, price_rise = 1.5, highest_price = 1e3;
 
 bool is_finite(const Obstacle& it) noexcept {
@@ -533,12 +533,15 @@ bool Controller::find_at_a_price(bool is_found, Clock::time_point deadline) noex
     const double rest = std::abs(command_.report.objective - violations);
     return std::isfinite(rest) ? rest : 0.0;
   };
+  const auto is_done = [&] {
+    return command_.report.status == Status::solved || command_.report.status == Status::step_taken;
+  };
   if (std::isinf(terms.price())) {
     const Status status = command_.report.status;
-    const bool is_answer = status == Status::solved || status == Status::step_taken || status == Status::relaxed;
-    if (is_answer || status == Status::bad_input || (is_found && plan_violation() <= violated)) return is_found;
+    if (is_done() || status == Status::relaxed || status == Status::bad_input) return is_found;
+    if (is_found && plan_violation() <= violated) return true;
     terms.set_price(1.0 + rest_of_objective(0.0));
-    if (is_found || std::isinf(terms.price()) || Clock::now() >= deadline) return is_found;
+    if (is_found || std::isinf(terms.price()) || is_past(deadline)) return is_found;
     start_cold();
     is_found = find_plan(deadline);
     command_.report.fallback_used = true;
@@ -546,9 +549,7 @@ bool Controller::find_at_a_price(bool is_found, Clock::time_point deadline) noex
   if (!is_found) return false;
   const double violation = plan_violation(), price = terms.price();
   const bool keeps_limits = violation <= violated;
-  const Status status = command_.report.status;
-  const bool is_done = status == Status::solved || status == Status::step_taken;
-  if (!keeps_limits && is_done) command_.report.status = Status::relaxed;
+  if (!keeps_limits && is_done()) command_.report.status = Status::relaxed;
   const double most = highest_price * (1.0 + rest_of_objective(price * violation));
   terms.set_price(keeps_limits ? std::numeric_limits<double>::infinity()
                                : std::max(price, std::min(price_rise * price, most)));
