@@ -34,6 +34,12 @@ bool is_finite(const Obstacle& it) noexcept {
   return std::ranges::all_of(numbers, [](double number) { return std::isfinite(number); });
 }
 
+double finite_size(double value) noexcept { return std::isfinite(value) ? std::abs(value) : 0.0; }
+
+double first_price(const Report& report) noexcept { return 1.0 + finite_size(report.objective); }
+
+bool is_done(Status status) noexcept { return status == Status::solved || status == Status::step_taken; }
+
 /// The problem's state that holds an input whose rate has a weight or bounds, or -1.
 std::vector<int> find_held_states(const Model& model, const Controller::Setup& setup) {
   const ModelDescription& about = model.description();
@@ -524,36 +530,40 @@ bool Controller::find_better(bool is_found, void (Controller::*start)() noexcept
 }
 
 /// Where hard limits cannot be kept, as outside a corridor, their violation has a price, an l1 penalty (Nocedal &
-/// Wright 2006, section 17.2), until a plan keeps them: a vehicle that a solver has no plan for does not come back. A
-/// low price leads to better minima; it rises until it is an exact one.
+/// Wright 2006, section 17.2), until a plan keeps them: a vehicle that a solver has no plan for does not come back.
 bool Controller::find_at_a_price(bool is_found, Clock::time_point deadline) noexcept {
   if (limit_values_.empty()) return is_found;
   HorizonTerms& terms = problem_.terms();
-  const auto rest_of_objective = [&](double violations) {
-    const double rest = std::abs(command_.report.objective - violations);
-    return std::isfinite(rest) ? rest : 0.0;
-  };
-  const auto is_done = [&] {
-    return command_.report.status == Status::solved || command_.report.status == Status::step_taken;
-  };
   if (std::isinf(terms.price())) {
-    const Status status = command_.report.status;
-    if (is_done() || status == Status::relaxed || status == Status::bad_input) return is_found;
-    if (is_found && plan_violation() <= violated) return true;
-    terms.set_price(1.0 + rest_of_objective(0.0));
-    if (is_found || std::isinf(terms.price()) || is_past(deadline)) return is_found;
+    if (is_found || command_.report.status == Status::bad_input) return is_found;
+    terms.set_price(first_price(command_.report));
+    if (std::isinf(terms.price()) || is_past(deadline)) return false;
     start_cold();
     is_found = find_plan(deadline);
     command_.report.fallback_used = true;
   }
-  if (!is_found) return false;
-  const double violation = plan_violation(), price = terms.price();
-  const bool keeps_limits = violation <= violated;
-  if (!keeps_limits && is_done()) command_.report.status = Status::relaxed;
-  const double most = highest_price * (1.0 + rest_of_objective(price * violation));
-  terms.set_price(keeps_limits ? std::numeric_limits<double>::infinity()
-                               : std::max(price, std::min(price_rise * price, most)));
-  return true;
+  if (is_found && is_done(command_.report.status) && plan_violation() > violated)
+    command_.report.status = Status::relaxed;
+  return is_found;
+}
+
+/// What violations of hard limits cost at the next sample. A low price leads to better minima; it rises until it is an
+/// exact one.
+void Controller::choose_price() noexcept {
+  if (limit_values_.empty() || command_.fallback) return;
+  HorizonTerms& terms = problem_.terms();
+  const double price = terms.price();
+  const Status status = command_.report.status;
+  if (std::isinf(price) && (is_done(status) || status == Status::relaxed)) return;
+  const double violation = plan_violation();
+  if (violation <= violated) {
+    terms.set_price(std::numeric_limits<double>::infinity());
+  } else if (std::isinf(price)) {
+    terms.set_price(first_price(command_.report));
+  } else {
+    const double most = highest_price * (1.0 + finite_size(command_.report.objective - price * violation));
+    terms.set_price(std::max(price, std::min(price_rise * price, most)));
+  }
 }
 
 /// What is applied keeps the bounds, whatever a solver says.
@@ -654,6 +664,7 @@ void Controller::finish() noexcept {
   if (is_finished_) return;
   is_finished_ = true;
   solver_->finish(point_, command_.report);
+  choose_price();
   if (!command_.violations.empty()) {
     // Of the limits that the vehicle meets next, whose data are still those of this sample.
     problem_.evaluate_limits(point_, limit_values_.data(), scratch_);

@@ -75,6 +75,7 @@ void HorizonTerms::take_data(const HorizonTerms& from) noexcept {
   data_ = from.data_;
   lower_ = from.lower_;
   upper_ = from.upper_;
+  set_price(from.price_);
 }
 
 void HorizonTerms::place(int node, const TermPlace& place) noexcept {

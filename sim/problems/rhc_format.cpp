@@ -139,6 +139,9 @@ void fill_terms(const ProblemRecord& record, RhcProblem& problem) {
       }
     }
   }
+  problem.terms().set_price(record.limit_price);
+  if (problem.terms().price() != record.limit_price)
+    throw Error(at_key(record.where, "limit_price", "there is no hard limit that it could be the price of; drop it"));
 }
 
 std::vector<ProblemRecord::PosedTerm> terms_of(const RhcProblem& problem) {
@@ -212,7 +215,7 @@ class RhcFormat final : public ProblemFormat {
       : ProblemFormat({.kind = "rhc",
                        .keys = {"version", "id", "problem", "model", "horizon", "initial_state", "parameters",
                                 "reference", "weights", "bounds", "block_starts"},
-                       .added = {{2, {"guess", "origin"}}, {3, {"rates"}}, {4, {"terms"}}},
+                       .added = {{2, {"guess", "origin"}}, {3, {"rates"}}, {4, {"terms"}}, {5, {"limit_price"}}},
                        .has_interval_bounds = true}) {}
 
   void read(const LineValue& line, ProblemRecord& record) const override {
@@ -227,6 +230,10 @@ class RhcFormat final : public ProblemFormat {
     if (line.has("block_starts")) read_block_starts(line["block_starts"], record);
     if (line.has("rates"))
       for (const LineValue& name : line["rates"].items("a list of inputs")) record.rates.push_back(name.text());
+    if (line.has("limit_price")) {
+      record.limit_price = line["limit_price"].number();
+      if (!(record.limit_price > 0.0)) throw line["limit_price"].mismatch("a number above 0");
+    }
     if (!line.has("terms")) return;
     const auto nodes = static_cast<std::size_t>(record.intervals) + 1;
     for (const LineValue& item : line["terms"].items("a list of terms")) {
@@ -253,6 +260,7 @@ class RhcFormat final : public ProblemFormat {
                                {"data", rows_of(term.data)},
                                {"lower", rows_of(term.lower)},
                                {"upper", rows_of(term.upper)}});
+    if (std::isfinite(record.limit_price)) line["limit_price"] = record.limit_price;
     if (!record.block_starts.empty())
       line["block_starts"] = map_of(record.block_starts, [](const std::vector<int>& starts) { return Json(starts); });
   }
@@ -271,6 +279,7 @@ class RhcFormat final : public ProblemFormat {
           "states of an InputRateModel, in their order",
           record.id));
     record.terms = terms_of(problem);
+    record.limit_price = problem.terms().price();
     record.initial_state = copied(problem.initial_state(), nx);
     record.parameters = copied(problem.initial_state() + nx, np);
     for (int j = 0; j < nx; ++j) {

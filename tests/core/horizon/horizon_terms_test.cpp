@@ -299,11 +299,14 @@ TEST(HorizonTerms, HardLimitsMayHaveAPriceForSomeTime) {
 TEST(HorizonTerms, DataAreTakenFromAnotherProblem) {
   const auto from = make_problem(Layers::none), to = make_problem(Layers::none);
   from->terms().place(3, {.time = 7.0});
+  from->terms().set_price(20.0);
   to->take_data(*from);
   EXPECT_EQ(to->limit_lower(3)[0], from->limit_lower(3)[0]);
   EXPECT_EQ(to->terms().data(3)[0], from->terms().data(3)[0]);
+  EXPECT_EQ(to->limit_linear(1)[1], 20.0);
   const RhcProblem copy(*from);
   EXPECT_EQ(copy.limit_lower(3)[0], 7.4);
+  EXPECT_EQ(copy.limit_linear(1)[1], 20.0);
 }
 
 }  // namespace horizon_terms_test

@@ -78,6 +78,7 @@ TEST(RhcFormat, StoresTermsWithTheirOptionsAndData) {
   problem.set_intervals(4);
   for (int i = 0; i < 4; ++i) problem.set_duration(i, 0.2);
   for (int i = 0; i <= 4; ++i) problem.terms().place(i, {.time = 0.2 * i, .x = 0.4 * i});
+  problem.terms().set_price(40.5);
   problem.given_parameters()[0] = problem.given_parameters()[1] = 0.9;
   std::vector<double> scratch(problem.scratch_size());
   problem.finish(scratch);
@@ -122,10 +123,15 @@ TEST(RhcFormat, StoresTermsWithTheirOptionsAndData) {
   EXPECT_THAT(wrong("\"name\":\"effort\"", "\"name\":\"efort\""), ::testing::HasSubstr("set.jsonl:3: terms[2]: "));
   EXPECT_THAT(wrong("\"most\":2", "\"most\":3"),
               ::testing::HasSubstr("terms[1].data[0]: 14 numbers, expected 21 for the term 'obstacles'"));
+  EXPECT_THAT(wrong("\"limit_price\":40.5", "\"limit_price\":-1"),
+              ::testing::HasSubstr("limit_price: found -1, expected a number above 0"));
+  EXPECT_THAT(wrong("\"hard\":true", "\"hard\":false"),
+              ::testing::HasSubstr("set.jsonl:3: limit_price: there is no hard limit"));
   EXPECT_EQ(wrong("\"lower\":[[-", "\"lower\":[[1"), "") << "a hard one; the solver says that it is infeasible";
+  const std::string without_price = replaced(line, ",\"limit_price\":40.5", "");
   const auto soft = [&](const char* lower) {
     std::vector<ProblemRecord> record{read_problem(
-        replaced(replaced(line, "\"hard\":true", "\"hard\":false"), "\"lower\":[[-", lower), "set.jsonl", 3)};
+        replaced(replaced(without_price, "\"hard\":true", "\"hard\":false"), "\"lower\":[[-", lower), "set.jsonl", 3)};
     make_terms(record, host);
     build(record[0], model);
   };

@@ -106,8 +106,7 @@ class RHEC_EXPORT Controller {
   void applied(const double* inputs) noexcept;
   /// Searches the whole path for the vehicle at the next call, as at the first one.
   void locate() noexcept;
-  /// Says where on the path the vehicle is [m], where that is known: a path may pass the same place more than once, as
-  /// laps do. The next call searches near it. A number that is not finite asks for the search of the whole path.
+  /// The next call searches near this place of the path [m], as of laps, or all of it where the number is not finite.
   void locate(double arc_length) noexcept;
   /// Says which obstacles there are from now on, as they were at a time on the clock of the estimates [s]. Where the
   /// terms have no room for all, it is those that come closest to the plan that there is, or, before the first one, to
@@ -151,6 +150,7 @@ class RHEC_EXPORT Controller {
   bool find_plan(Clock::time_point deadline) noexcept;
   bool find_better(bool is_found, void (Controller::*start)() noexcept, Clock::time_point deadline) noexcept;
   bool find_at_a_price(bool is_found, Clock::time_point deadline) noexcept;
+  void choose_price() noexcept;
   double plan_violation() noexcept;
   double distance_from_plan(const Obstacle& obstacle) const noexcept;
   bool plans_to_stand(int intervals) const noexcept;

@@ -47,7 +47,7 @@ class RHEC_EXPORT HorizonTerms {
   const double* data(int node) const noexcept { return data_.data() + at(node, data_row_); }
   const double* lower(int node) const noexcept { return lower_.data() + at(node, limits_); }
   const double* upper(int node) const noexcept { return upper_.data() + at(node, limits_); }
-  /// Takes data and bounds; the price of hard limits is no part of the problem as it was stated, and stays.
+  /// Takes data, bounds and the price of hard limits.
   void take_data(const HorizonTerms& from) noexcept;
 
   /// The rows of a node of a horizon of `intervals`; null if it has none.

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <map>
 #include <memory>
 #include <optional>
@@ -95,6 +96,9 @@ struct ProblemRecord {
     Rows data, lower, upper;
   };
   std::vector<PosedTerm> terms;
+  /// Since version 5: what hard limits of the terms cost by the unit that they are violated by; infinite: they are
+  /// hard.
+  double limit_price = std::numeric_limits<double>::infinity();
 
   /// Sets the id, and derives prefix and step from it.
   RHEC_EXPORT void set_id(std::string text);
