@@ -34,6 +34,8 @@ constexpr double lasting = 9.0;
 // be less than is said of them, since it learns: innovations then seem to say more of it. By such a share it is
 // corrected at once, and again while something is left.
 constexpr double share_of_input = 0.5;
+// Samples that count within which a jump of slip has been seen in positions.
+constexpr int samples_to_tell_slip = 3;
 // An offset that differs from none by less than so many standard deviations is none.
 constexpr double negligible = 2.0;
 // By no more than so many is one known that innovations have said: slip makes some that look like one, too, and later
@@ -336,7 +338,10 @@ void OffsetWatch::take(const WalkingFilter& filter, double excess,
     }
   }
   const bool is_measured = outputs_[watched] < 0 || filter.use(outputs_[watched]).variance > 0.0;
-  if (is_measured && most > (is_end ? improbable : limit_)) suspect_ = candidate_;
+  // Slip that jumps looks like an offset of what turns with it, until positions have said how far the vehicle has gone.
+  const bool is_told_from_slip = parameter_lower_.empty() || is_end || inputs_[watched] >= 0 || rivals_[watched] >= 0 ||
+                                 onsets_[candidate_].age >= samples_to_tell_slip;
+  if (is_measured && is_told_from_slip && most > (is_end ? improbable : limit_)) suspect_ = candidate_;
   probability_ = 1.0 / (1.0 + std::exp(0.5 * (even_odds - most)));
 }
 

@@ -164,6 +164,24 @@ TEST(OffsetWatch, AgesBySamplesThatCount) {
   }
 }
 
+/// Between two positions a quick gyro that slip stops says what one that is off would say.
+TEST(OffsetWatch, WaitsUntilSlipCanBeTold) {
+  for (const int every : {1, 12}) {
+    TrueBoat truth;
+    WatchedBoat boat;
+    int found = -1, counted = 0;
+    for (int k = 0; k < 200 && found < 0; ++k) {
+      const bool counts = k % every == 0;
+      boat.take(truth.measure(0.0, k < 36 ? 0.0 : 3.0 * offset), counts);
+      counted += k >= 36 && counts;
+      if (boat.watch.has_suspect()) found = k;
+    }
+    EXPECT_GE(found, 36);
+    EXPECT_LE(found, every == 1 ? 50 : 36 + 3 * every);
+    EXPECT_GE(counted, 3);
+  }
+}
+
 TEST(OffsetWatch, FindsNoneInWhiteNoise) {
   TrueBoat truth;
   WatchedBoat boat;
