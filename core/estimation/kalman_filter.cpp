@@ -1,4 +1,5 @@
 #include "rhec/core/estimation/kalman_filter.hpp"
+#include "any_angle.hpp"
 #include "rhec/core/base/angle.hpp"
 #include "rhec/core/model/motion_outputs.hpp"
 
@@ -372,6 +373,7 @@ void KalmanFilter::predict(const double* measured_input, const double* input_gue
   for (int j = 0; j < nu_; ++j)
     for (int r = 0; r < nx_ + np_; ++r)
       if (is_missing_[j]) input_guess_.set_with_state(r, j, guessed_(r, j));
+  release_angles(model_->description().states, covariance, input_guess_);
   input_guess_.predicted(mean, covariance);
 }
 

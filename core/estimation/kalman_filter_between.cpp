@@ -4,6 +4,7 @@
 
 #include <Eigen/Cholesky>
 
+#include "any_angle.hpp"
 #include "look_ahead.hpp"
 #include "rhec/core/base/angle.hpp"
 #include "rhec/core/base/assertion.hpp"
@@ -344,6 +345,7 @@ void KalmanFilter::take_guessed_inputs() noexcept {
       if (is_missing_[k]) input_guess_.set_covariance(j, k, wide_covariance_(n + j, n + k));
     for (int r = 0; r < n; ++r) input_guess_.set_with_state(r, j, wide_work_(r, n + j));
   }
+  release_angles(model_->description().states, covariance, input_guess_);
   input_guess_.predicted(mean, covariance);
 }
 

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "any_angle.hpp"
 #include "prior_bank_views.hpp"
 
 namespace rhec {
@@ -98,6 +99,9 @@ void PriorBank::Filters::take_guesses() noexcept {
       }
     }
     view_member(static_cast<int>(m));
+    if (release_angles(model_->description().states, full_covariance_, guess))
+      for (int c = 0; c < n_; ++c)
+        for (int r = 0; r < n_; ++r) covariance_[(c * n_ + r) * M + m] = full_covariance_(r, c);
     guess.predicted(full_mean_, full_covariance_);
   }
 }

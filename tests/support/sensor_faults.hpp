@@ -44,8 +44,8 @@ inline Robot with_two_receivers(const std::string& estimator, const std::string&
 }
 
 /// A skid-steered robot with a compass, that of output 2.
-inline Robot with_compass(const std::string& estimator) {
-  return {host(), RobotOptions::table().parse(parse_yaml(R"(
+inline Settings with_compass_settings(const std::string& estimator) {
+  return parse_yaml(R"(
 step: 0.2
 model: {name: skid_steer, wheel_radius: 0.2}
 noise: {outputs: {x_gps: 0.03, y_gps: 0.03, heading: 0.02}, inputs: {omega_left: 0.1, omega_right: 0.1}}
@@ -54,8 +54,11 @@ estimator:
   horizon: 15
   initial: {sigma: {x: 0.05, y: 0.05, psi: 0.03}}
 )",
-                                                         "robot"),
-                                              "robot")};
+                    "robot");
+}
+
+inline Robot with_compass(const std::string& estimator) {
+  return {host(), RobotOptions::table().parse(with_compass_settings(estimator), "robot")};
 }
 
 /// A farm vehicle whose axles slip sideways, with a compass: nothing of it says that its wheels slip along.

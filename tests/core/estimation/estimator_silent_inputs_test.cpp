@@ -149,6 +149,49 @@ TEST_P(SilentInputs, WithoutPositionsLetTheVehicleBeAnywhere) {
   EXPECT_GT(honest, 0.93 * samples);
 }
 
+struct SilentVehicle : ::testing::TestWithParam<const char*> {};
+
+/// Behind a silence of twelve seconds the compass speaks first: it says where the vehicle heads, and not where it is.
+TEST_P(SilentVehicle, IsNotMovedByWhatItsCompassSays) {
+  constexpr double tick = 0.01, wheel_radius = 0.2, track = 0.6, from = 20.0, to = 32.0;
+  Settings settings = with_compass_settings(GetParam());
+  apply_assignment(settings, "model.track_width=0.6");
+  const Robot vehicle(host(), RobotOptions::table().parse(settings, "robot"));
+  const auto estimator = vehicle.make_estimator();
+  std::mt19937_64 random(5);
+  std::normal_distribution<double> noise;
+  Eigen::Vector3d truth = Eigen::Vector3d::Zero();
+  Eigen::Vector2d before = Eigen::Vector2d::Zero();
+  double moved = 0.0, fixed = 0.0;
+  for (int i = 0; i < 3600; ++i) {
+    const double time = tick * i, turn = 0.8 * std::sin(0.3 * time), left = 10.0 - turn, right = 10.0 + turn;
+    if (!(time >= from && time < to)) {
+      if (i % 5 == 0) estimator->push_input(time, std::vector<double>{left, right}.data());
+      if (i % 10 == 4)
+        estimator->push_measurement(time, std::vector<double>{nan, nan, truth[2] + 0.02 * noise(random)}.data());
+      if (i % 100 == 80)
+        estimator->push_measurement(
+            time, std::vector<double>{truth[0] + 0.03 * noise(random), truth[1] + 0.03 * noise(random), nan}.data());
+    }
+    if (i % 20 == 19) {
+      const Estimate& now = estimator->estimate(time);
+      const double error = (now.state.head<2>() - truth.head<2>()).norm();
+      const bool is_placed = time < from || time > to + 0.8;
+      if (!is_placed) moved = std::max(moved, (now.state.head<2>() - before).norm());
+      before = now.state.head<2>();
+      if (time > to + 2.0) fixed = std::max(fixed, error);
+    }
+    const double speed = 0.5 * wheel_radius * (left + right);
+    truth += tick * Eigen::Vector3d(speed * std::cos(truth[2]), speed * std::sin(truth[2]),
+                                    wheel_radius * (right - left) / track);
+  }
+  EXPECT_LT(moved, 3.0);
+  EXPECT_LT(fixed, 0.5);
+}
+
+INSTANTIATE_TEST_SUITE_P(All, SilentVehicle, ::testing::Values("ekf", "bank", "rhe"),
+                         [](const auto& each) { return std::string(each.param); });
+
 INSTANTIATE_TEST_SUITE_P(All, SilentInputs, ::testing::Values("ekf", "bank", "rhe", "full_horizon", "blocks"),
                          [](const auto& each) { return std::string(each.param); });
 
