@@ -40,6 +40,17 @@ double first_price(const Report& report) noexcept { return 1.0 + finite_size(rep
 
 bool is_done(Status status) noexcept { return status == Status::solved || status == Status::step_taken; }
 
+/// The sum by which a plan violates hard limits, from their values.
+double hard_violation(const RhcProblem& problem, const double* values) noexcept {
+  double sum = 0.0;
+  for (int i = 0; i <= problem.intervals(); ++i, values += problem.capacity().limit_row()) {
+    const double *lower = problem.limit_lower(i), *upper = problem.limit_upper(i);
+    for (int r = 0; r < problem.limit_count(i); ++r)
+      if (problem.is_hard_limit(i, r)) sum += std::max({0.0, lower[r] - values[r], values[r] - upper[r]});
+  }
+  return sum;
+}
+
 /// The problem's state that holds an input whose rate has a weight or bounds, or -1.
 std::vector<int> find_held_states(const Model& model, const Controller::Setup& setup) {
   const ModelDescription& about = model.description();
@@ -547,15 +558,14 @@ bool Controller::find_at_a_price(bool is_found, Clock::time_point deadline) noex
   return is_found;
 }
 
-/// What violations of hard limits cost at the next sample. A low price leads to better minima; it rises until it is an
-/// exact one.
+/// What violations of hard limits cost at the next sample, once the plan's limits have been evaluated. A low price
+/// leads to better minima; it rises until it is an exact one.
 void Controller::choose_price() noexcept {
-  if (limit_values_.empty() || command_.fallback) return;
   HorizonTerms& terms = problem_.terms();
   const double price = terms.price();
   const Status status = command_.report.status;
   if (std::isinf(price) && (is_done(status) || status == Status::relaxed)) return;
-  const double violation = plan_violation();
+  const double violation = hard_violation(problem_, limit_values_.data());
   if (violation <= violated) {
     terms.set_price(std::numeric_limits<double>::infinity());
   } else if (std::isinf(price)) {
@@ -664,11 +674,11 @@ void Controller::finish() noexcept {
   if (is_finished_) return;
   is_finished_ = true;
   solver_->finish(point_, command_.report);
-  choose_price();
-  if (!command_.violations.empty()) {
+  if (!limit_values_.empty()) {
     // Of the limits that the vehicle meets next, whose data are still those of this sample.
     problem_.evaluate_limits(point_, limit_values_.data(), scratch_);
     find_excess(1, command_.violations);
+    if (!command_.fallback) choose_price();
   }
   if (has_plan_) {
     shifter_.take(problem_, point_);
@@ -677,18 +687,9 @@ void Controller::finish() noexcept {
   look_for_detour();
 }
 
-/// The sum by which a plan violates hard limits.
 double Controller::plan_violation() noexcept {
-  double sum = 0.0;
   problem_.evaluate_limits(point_, limit_values_.data(), scratch_);
-  for (int i = 0; i <= problem_.intervals(); ++i) {
-    const double* const values =
-        limit_values_.data() + static_cast<std::ptrdiff_t>(i) * problem_.capacity().limit_row();
-    const double *lower = problem_.limit_lower(i), *upper = problem_.limit_upper(i);
-    for (int r = 0; r < problem_.limit_count(i); ++r)
-      if (problem_.is_hard_limit(i, r)) sum += std::max({0.0, lower[r] - values[r], values[r] - upper[r]});
-  }
-  return sum;
+  return hard_violation(problem_, limit_values_.data());
 }
 
 /// By limit, how far the values that have been evaluated are beyond it up to a node, at most; 0: they keep it.
