@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <span>
 #include <utility>
 
+#include "any_angle.hpp"
 #include "innovation.hpp"
 #include "rhec/core/base/angle.hpp"
 
@@ -74,14 +74,15 @@ void WalkingFilter::predict(const double* inputs, double duration, const double*
     filter_.set_input_variance(static_cast<int>(j), setup_.noise.input_variances[j]);
 }
 
-/// A motion that nobody knows ends at a state's bounds, as that of a steering angle at its stop, and no angle is less
-/// known than that it is on the circle. What is capped keeps its correlations.
+/// A motion that nobody knows ends at a state's bounds, as that of a steering angle at its stop. What is capped keeps
+/// its correlations, but for an angle that may be any.
 void WalkingFilter::limit_states() noexcept {
   const std::vector<Variable>& states = model().description().states;
+  release_angles(states, covariance(), inputs());
   for (Eigen::Index j = 0; j < std::ssize(states); ++j) {
     const Variable& state = states[j];
     mean()[j] = std::min(std::max(mean()[j], state.lower), state.upper);
-    const double most = 0.5 * (state.is_angle ? 2.0 * std::numbers::pi : state.upper - state.lower);
+    const double most = 0.5 * (state.upper - state.lower);
     const double sigma = std::sqrt(covariance()(j, j));
     if (!(sigma > most)) continue;
     covariance().row(j) *= most / sigma;

@@ -114,6 +114,9 @@ TEST(WalkingFilter, AnUnknownMotionStaysWithinBounds) {
     EXPECT_GE(P.selfadjointView<Eigen::Lower>().eigenvalues().minCoeff(), -1e-9 * P.diagonal().maxCoeff());
   }
   EXPECT_DOUBLE_EQ(filter.mean()[steering], angle.lower);
+  const Eigen::MatrixXd& P = filter.covariance();
+  ASSERT_NEAR(std::sqrt(P(heading, heading)), std::numbers::pi, 1e-9);
+  EXPECT_DOUBLE_EQ(P.row(heading).squaredNorm(), P(heading, heading) * P(heading, heading)) << "it may be any";
 }
 
 TEST(WalkingFilter, InnovationsAreThoseOfTheTextbook) {
