@@ -734,14 +734,14 @@ const Estimate& Estimator::estimate(double time, Clock::time_point deadline) noe
   if (watch_) estimate_.innovations = watch_->innovations();
   const bool is_ahead = std::isfinite(time) && time > newest + timeline_.tolerance;
   const bool is_in_doubt = watch_ && is_all_taken_in && watch_->is_in_doubt();
-  const double covariance_factor = watch_ ? watch_->covariance_factor() : 1.0;
-  if (!is_ahead && !is_in_doubt && covariance_factor == 1.0) {
+  const bool is_correlated = watch_ && watch_->is_correlated();
+  if (!is_ahead && !is_in_doubt && !is_correlated) {
     assess(estimate_, std::isfinite(time) ? time : newest);
     return estimate_;
   }
   predicted_ = estimate_;
   // What is given out alone: everything goes on from what the method says.
-  predicted_.covariance *= covariance_factor;
+  if (is_correlated) watch_->scale(predicted_);
   if (is_in_doubt) {
     watch_->widen(predicted_);
     clip(predicted_);

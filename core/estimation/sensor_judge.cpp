@@ -227,6 +227,7 @@ SensorJudge::SensorJudge(std::shared_ptr<const Model> model, const Setup& setup)
   for (const Seen& each : seen_inputs(own_->filter))
     if (const int sensor = sensor_of(each.output, sensors_); sensor >= 0 && !sees_position(each.output))
       memory_->contradictions.push_back({each.input, each.output, static_cast<std::size_t>(sensor)});
+  memory_->correlated = std::make_unique<CorrelatedErrors>(*model);
   memory_->offsets = std::make_unique<OffsetWatch>(*model, watched, setup_.noise, offset_gate);
   if (model->description().roles.heading >= 0)
     for (auto* each : {&memory_->search, &memory_->second_thought})
@@ -282,16 +283,11 @@ void SensorJudge::reset() noexcept {
   memory_->has_advanced = false;
   memory_->offsets->reset();
   memory_->was_minor.assign(sensors_.size(), 0);
-  memory_->whiteness.assign(setup_.whiteness ? sensors_.size() : 0, {});
-  memory_->whiteness_of.assign(static_cast<std::size_t>(own_->filter.model().output_count()), nullptr);
-  for (std::size_t s = 0; s < memory_->whiteness.size(); ++s)
-    for (const int j : sensors_[s].outputs) memory_->whiteness_of[static_cast<std::size_t>(j)] = &memory_->whiteness[s];
+  memory_->correlated->reset(setup_.whiteness ? std::span<const Sensor>(sensors_) : std::span<const Sensor>());
   if (setup_.initial_covariance.size() > 0) {
     own_->filter.mean() = setup_.initial_mean;
     own_->filter.covariance() = setup_.initial_covariance;
   }
-  memory_->covariance_factor = 1.0;
-  memory_->typical_volume = memory_->volumes = 0.0;
   memory_->stuck.reset();
   memory_->beyond_bounds = 0.0;
   memory_->impossible_samples = 0;
@@ -496,7 +492,7 @@ SensorJudge::Finding SensorJudge::judge_each(double time, double* outputs) noexc
     heard_[s] = time;
     if (innovation.accepted) {
       ++states_[s].accepted;
-      if (setup_.whiteness) memory_->whiteness[s].take(innovation, sensors_[s].outputs.size());
+      if (setup_.whiteness) memory_->correlated->take(filter, s, sensors_[s], innovation);
       is_placed = is_placed || sees_position(sensors_[s].outputs);
       continue;
     }
@@ -535,8 +531,8 @@ SensorJudge::Finding SensorJudge::judge_each(double time, double* outputs) noexc
     const Finding doubt = doubt_bounds(is_disputed, is_placed);
     if (doubt.release) return doubt;
     finding.rebase = doubt.rebase;
-    memory_->offsets->take(filter, std::max(1.0, *std::ranges::max_element(excesses_)), memory_->whiteness_of,
-                           memory_->is_counted);
+    memory_->offsets->take(filter, std::max(1.0, *std::ranges::max_element(excesses_)),
+                           memory_->correlated->by_output(), memory_->is_counted);
     const bool is_told = told >= 0 && memory_->offsets->probable() == told;
     const bool is_found = !is_disputed && memory_->offsets->has_suspect();
     if (distrust_again()) return slip_is_new;

@@ -58,7 +58,8 @@ class SensorJudge {
   void advance_ahead(double duration, const double* inputs) noexcept;
   void judge_ahead(double* outputs, const double* weights) noexcept;
   void follow(const Estimate& estimate) noexcept;
-  double covariance_factor() const noexcept;
+  bool is_correlated() const noexcept;
+  void scale(Estimate& estimate) const noexcept;
   bool is_in_doubt() const noexcept;
   void widen(Estimate& estimate) noexcept;
   void assess(const Estimate& estimate, std::span<const Presence> presence, Presence inputs, std::uint32_t reasons,

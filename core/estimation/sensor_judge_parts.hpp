@@ -10,9 +10,9 @@
 
 #include <Eigen/Core>
 
+#include "correlated_errors.hpp"
 #include "heading_search.hpp"
 #include "information_loss.hpp"
-#include "innovation_whiteness.hpp"
 #include "log_volume.hpp"
 #include "numbers.hpp"
 #include "offset_watch.hpp"
@@ -141,11 +141,7 @@ struct SensorJudge::Memory {
   double slip_beyond = 0.0;
   StuckValues stuck;
   std::unique_ptr<OffsetWatch> offsets;
-  std::vector<InnovationWhiteness> whiteness;            ///< by sensor; empty: not watched
-  std::vector<const InnovationWhiteness*> whiteness_of;  ///< by output; null: not watched
-  double covariance_factor = 1.0;
-  double typical_volume = 0.0, volumes = 0.0;  ///< mean log sqrt(det P) over so many estimates
-  void note_whiteness(double volume, Eigen::Index size) noexcept;
+  std::unique_ptr<CorrelatedErrors> correlated;
   /// Of a measured input that is not believed by itself.
   struct Doubt {
     bool is_doubted = false;

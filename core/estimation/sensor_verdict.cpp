@@ -12,8 +12,7 @@ namespace rhec {
 namespace {
 
 constexpr double volume_memory = 10.0;  // that the usual volume is a mean over so many estimates before
-constexpr double typical_volume_memory = 300.0;
-constexpr double a_while = 1.0;  // by which a position is late, so that a heading is to be half as certain [s]
+constexpr double a_while = 1.0;         // by which a position is late, so that a heading is to be half as certain [s]
 
 }  // namespace
 
@@ -116,21 +115,10 @@ void SensorJudge::follow(const Estimate& estimate) noexcept {
   copy_numbers(estimate.covariance, own_->filter.covariance());
 }
 
-double SensorJudge::covariance_factor() const noexcept { return memory_->covariance_factor; }
+bool SensorJudge::is_correlated() const noexcept { return memory_->correlated->are_any(); }
 
-/// What is learnt from correlated innovations is less than the estimate believes. Where it knows less than usual, as
-/// after a jump, that is what is missing; and of this it is right.
-void SensorJudge::Memory::note_whiteness(double volume, Eigen::Index size) noexcept {
-  double most = 1.0;
-  for (const InnovationWhiteness& each : whiteness) most = std::max(most, each.factor());
-  if (std::isfinite(volume)) {
-    volumes = std::min(volumes + 1.0, typical_volume_memory);
-    typical_volume += (volume - typical_volume) / volumes;
-  }
-  covariance_factor = most;
-  if (most == 1.0 || !(volume > typical_volume)) return;
-  const double excess = 2.0 * (volume - typical_volume) / static_cast<double>(size);
-  covariance_factor = 1.0 + (most - 1.0) * std::exp(-excess);
+void SensorJudge::scale(Estimate& estimate) const noexcept {
+  memory_->correlated->scale(estimate.state, estimate.covariance);
 }
 
 bool SensorJudge::is_in_doubt() const noexcept { return slip_probability_ > 0.0 || memory_->offsets->is_in_doubt(); }
@@ -164,7 +152,7 @@ void SensorJudge::widen(Estimate& estimate) noexcept {
 /// What volume is usual is learnt where nothing is lacking.
 void SensorJudge::note_volume(const Estimate& estimate) noexcept {
   const double volume = log_volume(estimate.covariance, memory_->factor);
-  memory_->note_whiteness(volume, estimate.covariance.rows());
+  memory_->correlated->note(volume, estimate.covariance.rows());
   if (memory_->loss->is_active()) return;
   if (std::isnan(usual_volume_))
     usual_volume_ = volume;
@@ -186,7 +174,7 @@ void SensorJudge::assess(const Estimate& estimate, std::span<const Presence> pre
   health.inputs = inputs_;
   health.off_input = off_input_;
   health.doubted_input = doubted_input_;
-  health.covariance_factor = covariance_factor();
+  health.covariance_factor = memory_->correlated->mean(estimate.covariance.rows());
   if (inputs == Presence::silent) health.inputs.reasons |= reason::silent;
   bool has_finding = reasons != 0 || calm_samples_ < setup_.calm || (health.inputs.reasons & ~reason::off) != 0;
   bool is_overdue = inputs != Presence::present;
@@ -204,7 +192,7 @@ void SensorJudge::assess(const Estimate& estimate, std::span<const Presence> pre
     // What is no variance says that nothing is known. What correlated innovations add to it is no reason to stop.
     const auto is_known = [&](int i, double limit) {
       if (i < 0) return true;
-      const double added = (health.covariance_factor - 1.0) * std::max(0.0, own_->filter.covariance()(i, i));
+      const double added = (memory_->correlated->largest() - 1.0) * std::max(0.0, own_->filter.covariance()(i, i));
       return P(i, i) >= 0.0 && P(i, i) - added <= limit * limit;
     };
     is_place_known =
@@ -215,7 +203,7 @@ void SensorJudge::assess(const Estimate& estimate, std::span<const Presence> pre
       is_lost = true;
     }
     const InformationLoss& loss = *memory_->loss;
-    const double in_volume = 0.5 * static_cast<double>(P.rows()) * std::log(health.covariance_factor);
+    const double in_volume = memory_->correlated->in_volume(P.rows());
     // Where a sensor has a finding, all is said; a single sample that does not come is not worth a word.
     const bool has_lost = loss.samples_above() > 1 && loss.samples_since() <= setup_.calm && !memory_->was_open;
     if ((has_lost && !has_finding) ||

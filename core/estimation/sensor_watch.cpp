@@ -60,7 +60,8 @@ void SensorWatch::predict(double duration, const double* inputs, const double* i
   judge_->predict(duration, inputs, input_sigmas, estimate);
 }
 void SensorWatch::begin_predicting() noexcept { judge_->begin_predicting(); }
-double SensorWatch::covariance_factor() const noexcept { return judge_->covariance_factor(); }
+bool SensorWatch::is_correlated() const noexcept { return judge_->is_correlated(); }
+void SensorWatch::scale(Estimate& estimate) const noexcept { judge_->scale(estimate); }
 bool SensorWatch::is_in_doubt() const noexcept { return judge_->is_in_doubt(); }
 void SensorWatch::widen(Estimate& estimate) noexcept { judge_->widen(estimate); }
 void SensorWatch::begin_innovations() noexcept { judge_->begin_innovations(); }

@@ -52,7 +52,8 @@ struct Health {
   SensorHealth inputs;                ///< the measured inputs as a whole
   int off_input = -1;                 ///< the input that is off by `inputs.offset`; -1: none
   int doubted_input = -1;             ///< the one that is rejected while others are believed; -1: none
-  /// By how much larger the covariance that is given out is than the estimator's own, since innovations are correlated.
+  /// By how much larger the covariance that is given out is than the estimator's own, since innovations are correlated:
+  /// the geometric mean of all variables, which have factors of their own (docs/health.md).
   double covariance_factor = 1.0;
 };
 

@@ -108,8 +108,10 @@ class RHEC_EXPORT SensorWatch {
   void predict(double duration, const double* inputs, const double* input_sigmas, Estimate& estimate) noexcept;
   void begin_predicting() noexcept;  ///< the first such prediction follows, from the last sample on
 
-  /// By how much larger a covariance is to be, since innovations are correlated (Health::covariance_factor).
-  double covariance_factor() const noexcept;
+  /// Whether innovations are correlated, so that covariances are to be larger (Health::covariance_factor).
+  bool is_correlated() const noexcept;
+  /// Makes the covariance of an estimate as large as it is to be then.
+  void scale(Estimate& estimate) const noexcept;
   /// Whether estimates are to be widened: slip may have jumped, or a sensor is off.
   bool is_in_doubt() const noexcept;
   /// Gives an estimate at the last sample the covariance that it has if slip may have jumped, with the probability w
