@@ -228,7 +228,11 @@ TEST(GoBack, IntoACorridorFromOutside) {
     for (const double aside : {1.5, -3.0, 6.0}) {
       for (const double angle : {0.0, 0.4, -0.4, 1.2, -1.2}) {
         const std::string what = fmt::format("{}, {} m, {} rad", vehicle, aside, angle);
-        const Turned comes = turned(in_corridor(vehicle), angle, 150, aside);
+        // From afar, looking away, it comes in across the corridor, and turns within it in several moves. How long it
+        // stands between these is a matter of rounding: it is on its way after 20 s by some instruction sets, after 28
+        // s by others.
+        const bool comes_across = aside == 6.0 && angle == 1.2;
+        const Turned comes = turned(in_corridor(vehicle), angle, comes_across ? 250 : 150, aside);
         EXPECT_LT(std::abs(comes.beside), 0.05) << what;
         EXPECT_GT(comes.way, 20.0) << what;
         EXPECT_LT(comes.farthest, std::abs(aside) + 1.0) << what;
