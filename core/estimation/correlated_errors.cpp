@@ -11,14 +11,13 @@ namespace {
 // Estimates.
 constexpr double typical_volume_memory = 300.0, information_memory = 50.0;
 
-/// What an innovation says of a direction of outputs; nothing where these do not see it.
+/// What an innovation says of a direction of outputs. False where these do not see it.
 bool project(const Innovation& innovation, const Innovation::OfSensor<1>& direction, Innovation& result) noexcept {
-  if (!(direction.squaredNorm() > 0.0)) return false;
   result.value.resize(1);
   result.covariance.resize(1, 1);
   result.value[0] = direction.dot(innovation.value);
   result.covariance(0, 0) = direction.dot(innovation.covariance * direction);
-  return true;
+  return result.covariance(0, 0) > 0.0;
 }
 
 }  // namespace
@@ -64,7 +63,7 @@ void CorrelatedErrors::take(const WalkingFilter& filter, std::size_t index, cons
 
 CorrelatedErrors::Factors CorrelatedErrors::found() const noexcept {
   double information = 0.0, others = 1.0;
-  Factors of_position{0.0, 0.0, 0.0, 0.0};
+  Factors of_position{0.0, 0.0, 0.0};
   for (std::size_t s = 0; s < sensors_.size(); ++s) {
     if (directions_.empty() || !(directions_[s].information > 0.0)) {
       others = std::max(others, sensors_[s].factor());
@@ -76,12 +75,10 @@ CorrelatedErrors::Factors CorrelatedErrors::found() const noexcept {
     of_position.along += directions.information * directions.along.factor();
     of_position.across += directions.information * directions.across.factor();
   }
-  if (!(information > 0.0)) return {others, others, others, others};
-  const double across = std::max(others, of_position.across / information);
+  if (!(information > 0.0)) return {others, others, others};
   return {.all_else = std::max(others, of_position.all_else / information),
           .along = std::max(others, of_position.along / information),
-          .across = across,
-          .heading = across};
+          .across = std::max(others, of_position.across / information)};
 }
 
 void CorrelatedErrors::note(double volume, Eigen::Index size) noexcept {
@@ -93,20 +90,19 @@ void CorrelatedErrors::note(double volume, Eigen::Index size) noexcept {
   for (Directions& each : directions_) each.information *= 1.0 - 1.0 / information_memory;
   if (!are_any() || !(volume > typical_volume_)) return;
   const double share = std::exp(-2.0 * (volume - typical_volume_) / static_cast<double>(size));
-  for (double* factor : {&factors_.all_else, &factors_.along, &factors_.across, &factors_.heading})
+  for (double* factor : {&factors_.all_else, &factors_.along, &factors_.across})
     *factor = 1.0 + (*factor - 1.0) * share;
 }
 
 double CorrelatedErrors::largest() const noexcept {
-  return std::max({factors_.all_else, factors_.along, factors_.across, factors_.heading});
+  return std::max({factors_.all_else, factors_.along, factors_.across});
 }
 
 void CorrelatedErrors::scale(const Eigen::VectorXd& state, Eigen::MatrixXd& covariance) const noexcept {
   covariance *= factors_.all_else;
   if (!has_directions() || !std::isfinite(state[heading_])) return;
   const double along = std::sqrt(factors_.along / factors_.all_else),
-               across = std::sqrt(factors_.across / factors_.all_else),
-               heading = std::sqrt(factors_.heading / factors_.all_else);
+               across = std::sqrt(factors_.across / factors_.all_else);
   const double cosine = std::cos(state[heading_]), sine = std::sin(state[heading_]);
   const double xx = along * cosine * cosine + across * sine * sine, xy = (along - across) * cosine * sine,
                yy = along * sine * sine + across * cosine * cosine;
@@ -118,11 +114,11 @@ void CorrelatedErrors::scale(const Eigen::VectorXd& state, Eigen::MatrixXd& cova
   const Eigen::Index n = covariance.rows();
   for (Eigen::Index j = 0; j < n; ++j) {
     mix(covariance(x_, j), covariance(y_, j));
-    covariance(heading_, j) *= heading;
+    covariance(heading_, j) *= across;
   }
   for (Eigen::Index j = 0; j < n; ++j) {
     mix(covariance(j, x_), covariance(j, y_));
-    covariance(j, heading_) *= heading;
+    covariance(j, heading_) *= across;
   }
   // Rounding must not leave it unsymmetric.
   for (const int i : {x_, y_, heading_})
@@ -133,8 +129,7 @@ void CorrelatedErrors::scale(const Eigen::VectorXd& state, Eigen::MatrixXd& cova
 double CorrelatedErrors::in_volume(Eigen::Index size) const noexcept {
   const double all = 0.5 * static_cast<double>(size) * std::log(factors_.all_else);
   if (!has_directions()) return all;
-  return all + 0.5 * (std::log(factors_.along) + std::log(factors_.across) + std::log(factors_.heading) -
-                      3.0 * std::log(factors_.all_else));
+  return all + 0.5 * std::log(factors_.along / factors_.all_else) + std::log(factors_.across / factors_.all_else);
 }
 
 double CorrelatedErrors::mean(Eigen::Index size) const noexcept {

@@ -21,9 +21,9 @@ namespace rhec {
 /// sum w_i f_i times what is stated. Of other sensors the largest factor counts, and for all variables: receivers may
 /// be too slow or too rough to show what comes of their errors.
 ///
-/// With s_j^2 the factors of the position along and across, of the heading, which is learnt across, and of all else,
-/// P becomes D P D, D = R diag(s_along, s_across) R' for the position, s_heading for the heading, s_else I for all
-/// else.
+/// With s_j^2 the factors of the position along and across, and of all else, P becomes D P D,
+/// D = R diag(s_along, s_across) R' for the position, s_across for the heading, which is learnt across, s_else I for
+/// all else.
 class CorrelatedErrors {
  public:
   explicit CorrelatedErrors(const Model& model);
@@ -50,7 +50,7 @@ class CorrelatedErrors {
 
  private:
   struct Factors {
-    double all_else = 1.0, along = 1.0, across = 1.0, heading = 1.0;
+    double all_else = 1.0, along = 1.0, across = 1.0;  ///< `across`: of the heading as well
   };
   struct Directions {
     InnovationWhiteness along, across;
