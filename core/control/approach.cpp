@@ -13,15 +13,20 @@ namespace {
 constexpr double most_ahead = 8.0, ahead_step = 0.5;
 // Room beside the path is looked at in steps of this many radii. Rounding is no lack of it [m].
 constexpr double room_step = 0.25, room_rounding = 1e-6;
-// The vehicle's place is looked for this far ahead, in so many steps: never on another arc that passes it [radii].
+// The vehicle's place is looked for this far ahead: never on another arc that passes it [radii].
 constexpr double search_window = 1.0;
-constexpr int search_steps = 32;
 // A vehicle that looks away from its way by more than this [rad], or is farther from it than this [radii], has left it.
 constexpr double most_off = 0.5 * std::numbers::pi, most_beside = 2.0;
 
 }  // namespace
 
-bool Approach::begin(const Path& path, int section, double arc_length, const Pose& vehicle, const Turn& turn) noexcept {
+double beyond_room(const Path& path, const PathProjection& place) noexcept {
+  const PathPoint point = path.point_at(place.arc_length);
+  return std::max({0.0, place.lateral - point.left, -place.lateral - point.right});
+}
+
+bool Approach::begin(const Path& path, int section, double arc_length, const Pose& vehicle,
+                     const TurningCircle& turn) noexcept {
   is_under_way_ = false;
   if (!(turn.radius > 0.0) || !(turn.speed > 0.0) || !std::isfinite(turn.radius)) return false;
   if (!std::isfinite(vehicle.x) || !std::isfinite(vehicle.y) || !std::isfinite(vehicle.direction)) return false;
@@ -66,10 +71,8 @@ bool Approach::has_room(const Path& path) const noexcept {
   double allowed = room_rounding;
   for (double along = 0.0; along <= way_.length(); along += room_step * turn_.radius) {
     const Pose place = way_.pose_at(along);
-    const auto [arc_length, lateral] = beside(path, place.x, place.y);
-    const PathPoint point = path.point_at(arc_length);
-    const double beyond = std::max(lateral - point.left, -lateral - point.right);
-    if (along == 0.0) allowed = std::max(beyond, 0.0) + room_rounding;
+    const double beyond = beyond_room(path, beside(path, place.x, place.y));
+    if (along == 0.0) allowed = beyond + room_rounding;
     if (beyond > allowed) return false;
   }
   return true;
@@ -77,19 +80,12 @@ bool Approach::has_room(const Path& path) const noexcept {
 
 void Approach::advance(double x, double y, double heading) noexcept {
   if (!is_under_way_ || !std::isfinite(x) || !std::isfinite(y)) return;
-  double nearest = done_, least = HUGE_VAL;
-  for (int i = 0; i <= search_steps; ++i) {
-    const double along = done_ + i * search_window * turn_.radius / search_steps;
-    const Pose there = way_.pose_at(along);
-    const double distance = std::hypot(x - there.x, y - there.y);
-    if (distance >= least) continue;
-    least = distance;
-    nearest = along;
-  }
-  done_ = nearest;
+  const NearestPose nearest = nearest_pose([&](double along) { return way_.pose_at(along); }, done_,
+                                           done_ + search_window * turn_.radius, x, y);
+  done_ = nearest.along;
   const double direction = heading + (in_reverse_ ? std::numbers::pi : 0.0);
   const double off = std::abs(angle_difference(direction, way_.pose_at(done_).direction));
-  is_under_way_ = !has_arrived() && off < most_off && least < most_beside * turn_.radius;
+  is_under_way_ = !has_arrived() && off < most_off && nearest.distance < most_beside * turn_.radius;
 }
 
 double Approach::arc_length_after(double arc_length, double time) const noexcept {

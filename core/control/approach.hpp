@@ -5,6 +5,16 @@
 
 namespace rhec {
 
+/// How a vehicle turns.
+struct TurningCircle {
+  double radius = 0.0;    ///< [m], of arcs that it can drive
+  double speed = 0.0;     ///< [m/s], at which it does
+  double steering = 0.0;  ///< for how long it steers until it does [s]
+};
+
+/// How far a place is beyond the room that the path has beside it [m]; 0: it is not.
+double beyond_room(const Path& path, const PathProjection& place) noexcept;
+
 /// The way back to a path for a vehicle that looks away from it. It is a DubinsPath with arcs that the vehicle can
 /// drive, to that place further on where this way and the part of the path that is left out are shortest together. It
 /// is driven at one speed, in the direction of the path there: in reverse where the path is.
@@ -13,15 +23,9 @@ namespace rhec {
 /// from there on it is the path. Neither allocates nor throws.
 class Approach {
  public:
-  /// How a vehicle turns.
-  struct Turn {
-    double radius = 0.0;  ///< [m], of arcs that it can drive
-    double speed = 0.0;   ///< [m/s], at which it does
-  };
-
   /// Begins where the vehicle is, with its heading, to the path at an arc length or further on in that section. Where
   /// the path has room beside it, the way keeps to it as far as the vehicle does now. False: there is no such way.
-  bool begin(const Path& path, int section, double arc_length, const Pose& vehicle, const Turn& turn) noexcept;
+  bool begin(const Path& path, int section, double arc_length, const Pose& vehicle, const TurningCircle& turn) noexcept;
   void end() noexcept { is_under_way_ = false; }
   bool is_under_way() const noexcept { return is_under_way_; }
 
@@ -41,7 +45,7 @@ class Approach {
   bool has_room(const Path& path) const noexcept;
 
   DubinsPath way_;
-  Turn turn_;
+  TurningCircle turn_;
   double target_ = 0.0, done_ = 0.0;  ///< [m]
   double first_ = 0.0, last_ = 0.0;   ///< where the section begins and ends [m]
   bool in_reverse_ = false;

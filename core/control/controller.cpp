@@ -382,20 +382,7 @@ void Controller::set_reference(double arc_length, const double* parameters, doub
     double* x = problem_.state_reference(i);
     std::copy_n(straight_.data(), nx, x);
     roles.place(target.x, target.y, target.heading, x);
-    // Limits of terms are beside the path, also where the reference is a way back to it, or backwards.
-    const bool is_beside = detour_->approach.is_under_way();
-    const double along = is_beside ? detour_->approach.beside(path_, target.x, target.y).arc_length : arc_lengths_[i];
-    const PathPoint place = detour_->is_under_way() ? path_.point_at(along) : target;
-    problem_.terms().place(i, {.time = time + i * setup_.interval,
-                               .x = place.x,
-                               .y = place.y,
-                               .heading = place.heading + (place.in_reverse ? std::numbers::pi : 0.0),
-                               .speed = target.speed,
-                               .arc_length = along,
-                               .left = place.left,
-                               .right = place.right,
-                               .obstacles = {obstacles_.data(), obstacle_count_},
-                               .seen = seen_});
+    place_terms(i, i, time);
     if (i < N) choose(0.5 * (target.speed + points_[i + 1].speed));
     for (int j = 0; j < nu && i < N; ++j) {
       // The inputs on an interval are states at its end.
@@ -403,6 +390,27 @@ void Controller::set_reference(double arc_length, const double* parameters, doub
       (held < 0 ? problem_.input_reference(i)[j] : problem_.state_reference(i + 1)[held]) = straight_[nx + j];
     }
   }
+}
+
+/// Says to the terms of a node what is at a point of the reference. Their limits are beside the path, also where the
+/// reference is a way back to it, or backwards.
+void Controller::place_terms(int node, int point, double time) noexcept {
+  const Detour& detour = *detour_;
+  const PathPoint& target = points_[point];
+  const double along = detour.approach.is_under_way() ? detour.approach.beside(path_, target.x, target.y).arc_length
+                       : detour.turn.is_under_way()   ? detour.turn.beside(path_, target.x, target.y).arc_length
+                                                      : arc_lengths_[point];
+  const PathPoint place = detour.is_under_way() ? path_.point_at(along) : target;
+  problem_.terms().place(node, {.time = time + point * setup_.interval,
+                                .x = place.x,
+                                .y = place.y,
+                                .heading = place.heading + (place.in_reverse ? std::numbers::pi : 0.0),
+                                .speed = target.speed,
+                                .arc_length = along,
+                                .left = place.left,
+                                .right = place.right,
+                                .obstacles = {obstacles_.data(), obstacle_count_},
+                                .seen = seen_});
 }
 
 /// The inputs applied last, which are given states where their rates count.

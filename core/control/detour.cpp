@@ -3,12 +3,14 @@
 #include <numbers>
 
 #include "detour.hpp"
+#include "rhec/core/base/angle.hpp"
 #include "rhec/core/base/infinity.hpp"
 #include "rhec/core/control/controller.hpp"
 #include "rhec/core/term/term_functions.hpp"
 
 // A vehicle that stands where its path goes on. If it looks away from the path, and no plan turns it, its reference
-// becomes a way back (Approach); if limits keep it from going on, the path backwards (Retreat).
+// becomes a way back (Approach), or a turn in several moves where there is no room for one (MultiPointTurn); if limits
+// keep it from going on otherwise, the path backwards (Retreat).
 
 namespace rhec {
 namespace {
@@ -24,7 +26,7 @@ constexpr double away = 0.25 * std::numbers::pi;
 constexpr double wider_again = 1.3, most_margin = 3.0;
 // Going back is slower than turning around by this factor, and is done so many times in a row.
 constexpr double retreat_share = 0.5;
-constexpr int most_retreats = 3;
+constexpr int most_retreats = 3, most_turns = 6;
 // It does so with no more than this lateral acceleration [m/s^2], so slowly that it turns by no more than this while it
 // steers [rad], and at this share of the path's top speed where the path stops.
 constexpr double turning_acceleration = 1.0, turn_while_steering = 0.5, least_turning_share = 0.3;
@@ -33,6 +35,11 @@ constexpr double turning_acceleration = 1.0, turn_while_steering = 0.5, least_tu
 constexpr double patience = 5.0;
 // Where there is no way back, one is looked for again after so long [s].
 constexpr double again = 1.0;
+// A move of a turn in several ones turns by more than this, until the vehicle looks away by no more than that; all of
+// them together turn by no more than this [rad].
+constexpr double least_move = 0.1, most_rotation = 1.5 * std::numbers::pi;
+// What is off by this share of its typical magnitude and grows by more than this factor is not steady.
+constexpr double small_change = 1e-3, steady_growth = 1.05;
 // What is not tighter by this share is as tight.
 constexpr double tighter = 1e-3;
 // Of inputs that are tried for it every one is at its least, its straight or its largest value; of more than this many,
@@ -45,10 +52,10 @@ constexpr double limit_rounding = 1e-6;
 
 /// How a vehicle turns in a trial, as far as it keeps its bounds, and forwards (sense 1) or in reverse (-1) at no more
 /// than a speed: on arcs that are wider by `margin`.
-Approach::Turn tightest_turn(const RhcProblem& problem, const Iterate& trial, double speed, double sense,
-                             double margin) noexcept {
+TurningCircle turn_in_trial(const RhcProblem& problem, const Iterate& trial, double speed, double sense,
+                            double margin) noexcept {
   const Roles& roles = problem.model().description().roles;
-  Approach::Turn tightest{.radius = infinity};
+  TurningCircle tightest{.radius = infinity};
   double time = 0.0, reached = 0.0;
   for (int i = 0; i < problem.intervals(); ++i) {
     const double *from = trial.state(i), *to = trial.state(i + 1), dt = problem.duration(i);
@@ -74,6 +81,7 @@ Approach::Turn tightest_turn(const RhcProblem& problem, const Iterate& trial, do
   }
   tightest.speed = std::min({speed, tightest.speed, std::sqrt(turning_acceleration * tightest.radius),
                              turn_while_steering * tightest.radius / reached});
+  tightest.steering = reached;
   return tightest;
 }
 
@@ -96,12 +104,23 @@ double detour_speed(const Path& path, double arc_length) noexcept {
   return std::max(std::abs(path.point_at(arc_length).speed), least_turning_share * path.top_speed());
 }
 
+/// Whether the path, where the vehicle is on it, leads against its heading.
+bool goes_in_reverse(const PathFollower& follower) noexcept {
+  return follower.path().point_at(follower.arc_length()).in_reverse;
+}
+
+/// Of a vehicle with a heading, against the path itself [rad].
+double heading_error(const PathFollower& follower, double heading) noexcept {
+  return angle_difference(heading, follower.path().point_at(follower.arc_length()).heading);
+}
+
 }  // namespace
 
 /// Where the vehicle is on the path, or on what it drives in place of it.
 double Controller::arc_length() const noexcept {
   const Detour& detour = *detour_;
   return detour.approach.is_under_way()  ? detour.approach.arc_length()
+         : detour.turn.is_under_way()    ? detour.turn.arc_length()
          : detour.retreat.is_under_way() ? detour.retreat.arc_length()
                                          : follower_.arc_length();
 }
@@ -109,6 +128,7 @@ double Controller::arc_length() const noexcept {
 double Controller::arc_length_after(double arc_length, double time, int& segment) const noexcept {
   const Detour& detour = *detour_;
   return detour.approach.is_under_way()  ? detour.approach.arc_length_after(arc_length, time)
+         : detour.turn.is_under_way()    ? detour.turn.arc_length_after(arc_length, time)
          : detour.retreat.is_under_way() ? detour.retreat.arc_length_after(arc_length, time)
                                          : path_.arc_length_after(arc_length, time, segment);
 }
@@ -116,6 +136,7 @@ double Controller::arc_length_after(double arc_length, double time, int& segment
 PathPoint Controller::point_at(double arc_length, int& segment) const noexcept {
   const Detour& detour = *detour_;
   return detour.approach.is_under_way()  ? detour.approach.point_at(path_, arc_length)
+         : detour.turn.is_under_way()    ? detour.turn.point_at(arc_length)
          : detour.retreat.is_under_way() ? detour.retreat.point_at(path_, arc_length)
                                          : path_.point_at(arc_length, segment);
 }
@@ -127,23 +148,37 @@ bool Controller::goes_on_detour(const Estimate& estimate) noexcept {
   const Roles& roles = vehicle_->description().roles;
   const double x = estimate.state[roles.position_x], y = estimate.state[roles.position_y],
                heading = estimate.state[roles.heading];
-  const bool turns = detour.approach.is_under_way();
+  const bool goes_round = detour.approach.is_under_way(), turns = detour.turn.is_under_way();
   const double before = arc_length();
-  turns ? detour.approach.advance(x, y, heading) : detour.retreat.advance(path_, x, y, heading);
-  const double after = turns ? detour.approach.arc_length() : detour.retreat.arc_length();
+  if (goes_round)
+    detour.approach.advance(x, y, heading);
+  else if (!turns)
+    detour.retreat.advance(path_, x, y, heading);
+  else if (detour.turn.advance(x, y, heading, setup_.interval))
+    has_plan_ = false;  // it leads the other way
+  const double after = goes_round ? detour.approach.arc_length()
+                       : turns    ? detour.turn.arc_length()
+                                  : detour.retreat.arc_length();
   const double least = least_wanted * setup_.interval * path_.top_speed();
-  const bool gets_along = std::abs(after - before) > least * pace_ || pace_ == 0.0;
+  const bool gets_along = std::abs(after - before) > least * pace_ || pace_ == 0.0 || detour.turn.waits();
   detour.stalled = gets_along ? 0.0 : detour.stalled + setup_.interval;
-  if (detour.is_under_way() && detour.stalled < patience) return true;
-  if (turns) {
-    const bool has_arrived = detour.approach.has_arrived();
-    if (has_arrived) follower_.reset(detour.approach.target());
-    detour.margin = has_arrived ? Detour::arc_margin : std::min(detour.margin * wider_again, most_margin);
+  if (detour.is_under_way() && (turns || detour.stalled < patience)) return true;
+  if (goes_round || turns) {
+    const bool has_arrived = goes_round ? detour.approach.has_arrived() : detour.turn.has_arrived();
+    if (turns)
+      follower_.reset(detour.turn.beside(path_, x, y).arc_length);
+    else if (has_arrived)
+      follower_.reset(detour.approach.target());
+    if (has_arrived)
+      detour.margin = Detour::arc_margin;
+    else if (goes_round)
+      detour.margin = std::min(detour.margin * wider_again, most_margin);
   } else {
     follower_.reset(after);
-    has_plan_ = false;  // it leads back
   }
+  if (!goes_round) has_plan_ = false;  // it leads back
   detour.approach.end();
+  detour.turn.end();
   detour.retreat.end();
   detour.stalled = 0.0;
   return false;
@@ -167,71 +202,108 @@ bool Controller::plans_to_stand(int intervals) const noexcept {
 void Controller::note_standing(const Health& health) noexcept {
   Detour& detour = *detour_;
   is_lost_ = health.level == HealthLevel::lost;
-  command_.turns_around = detour.approach.is_under_way();
-  command_.goes_back = detour.retreat.is_under_way();
-  // A plan may be to drive on later, in each sample anew.
+  command_.turns_around = detour.approach.is_under_way() || detour.turn.is_under_way();
+  command_.goes_back = detour.retreat.is_under_way() ||
+                       (detour.turn.is_under_way() && detour.turn.in_reverse() != goes_in_reverse(follower_));
+  // A plan may be to drive on later, in each sample anew: a way on is looked for soon.
   detour.rested = plans_to_stand(1) ? detour.rested + setup_.interval : 0.0;
   command_.stands = plans_to_stand(problem_.intervals()) || detour.rested > patience;
-  const bool stands = command_.stands && vehicle_->description().roles.heading >= 0 && !detour.retreat.is_under_way();
+  const bool stands = (command_.stands || detour.rested > again) && vehicle_->description().roles.heading >= 0 &&
+                      !detour.retreat.is_under_way() && !detour.turn.is_under_way();
   detour.standing = stands ? detour.standing + setup_.interval : 0.0;
   if (!stands) detour.searched = 0.0;
-  if (follower_.arc_length() > detour.regained) detour.retreats = 0;
+  if (follower_.arc_length() > detour.regained) {
+    detour.turns = detour.retreats = 0;
+    detour.least_off = std::numbers::pi;
+  }
   const bool faces_away = stands && std::abs(command_.heading_error) > away;
-  command_.faces_away = faces_away && (!setup_.turns_around || is_lost_ || detour.searched > 0.0);
+  command_.faces_away = faces_away && command_.stands && (!setup_.turns_around || is_lost_ || detour.searched > 0.0);
 }
 
-/// Whether the way back keeps the limits of terms, soft ones, too, as well as the vehicle does now. Changes references.
-bool Controller::approach_keeps_limits(double time) noexcept {
-  if (limit_values_.empty()) return true;
+/// How far the reference, from one place to another, keeps the limits of terms, soft ones, too, and the path's room as
+/// well as the vehicle does now, which is where a detour begins (`is_begin`). Changes references.
+double Controller::limits_kept_until(double from, double to, double time, bool is_begin) noexcept {
   const int N = problem_.intervals(), nx = problem_.model().state_count(), nu = vehicle_->input_count();
-  const Approach& approach = detour_->approach;
-  bool is_first = true;
-  for (double at = approach.arc_length(); at < approach.target();) {
+  Detour& detour = *detour_;
+  for (double at = from; at < to;) {
     set_reference(at, problem_.given_parameters(), time);
     for (int i = 0; i < N; ++i)
       for (int j = 0; j < nu; ++j)
         scratch_[static_cast<std::size_t>(i) * nu + j] = held_state_[j] < 0 ? input_reference(i, j) : 0.0;
     problem_.structure().set_decisions(relaxed_plan_, scratch_.data(), problem_.given_parameters());
     for (int i = 0; i <= N; ++i) std::copy_n(problem_.state_reference(i), nx, relaxed_plan_.state(i));
-    problem_.evaluate_limits(relaxed_plan_, limit_values_.data(), scratch_);
-    if (is_first) find_excess(0, detour_->excess_now);
-    is_first = false;
-    find_excess(N, detour_->excess_ahead);
-    for (std::size_t l = 0; l < detour_->excess_now.size(); ++l)
-      if (!(detour_->excess_ahead[l] <= detour_->excess_now[l] + limit_rounding)) return false;
-    const double next = approach.arc_length_after(at, N * setup_.interval);
+    if (is_begin && !limit_values_.empty()) {
+      // The first node has no limits of states, which are given: those of the second one, at the same place.
+      place_terms(1, 0, time);
+      std::copy_n(problem_.state_reference(0), nx, relaxed_plan_.state(1));
+      problem_.evaluate_limits(relaxed_plan_, limit_values_.data(), scratch_);
+      find_excess(1, detour.excess_now);
+      place_terms(1, 1, time);
+      std::copy_n(problem_.state_reference(1), nx, relaxed_plan_.state(1));
+    }
+    if (!limit_values_.empty()) problem_.evaluate_limits(relaxed_plan_, limit_values_.data(), scratch_);
+    for (int i = 0; i <= N; ++i) {
+      find_excess(i, detour.excess_ahead);
+      bool is_kept = true;
+      for (std::size_t l = 0; l < detour.excess_now.size(); ++l)
+        is_kept = is_kept && detour.excess_ahead[l] <= detour.excess_now[l] + limit_rounding;
+      if (detour.turn.is_under_way()) {
+        const double beyond = beyond_room(path_, detour.turn.beside(path_, points_[i].x, points_[i].y));
+        if (is_begin && i == 0) detour.beyond_now = beyond;
+        is_kept = is_kept && beyond <= detour.beyond_now + limit_rounding;
+      }
+      if (!is_kept) return i > 0 ? arc_lengths_[i - 1] : at;
+    }
+    is_begin = false;
+    const double next = arc_lengths_[N];
     if (!(next > at)) break;
     at = next;
     time += N * setup_.interval;
   }
-  return true;
+  return to;
 }
 
-/// Begins a detour from the next sample on, where the vehicle stands and is to have one. Changes references.
+/// Begins a detour from the next sample on, where the vehicle stands and is to have one, or is stuck on its turn in
+/// several moves. Changes references.
 void Controller::look_for_detour() noexcept {
   Detour& detour = *detour_;
-  if (!setup_.turns_around || detour.standing == 0.0) return;
-  // Who does not know where the vehicle heads will know better soon, mostly; if not, it is motion that tells.
-  if (is_lost_ && detour.standing < patience) return;
+  if (!setup_.turns_around) return;
+  const bool is_stuck = detour.turn.is_under_way() && detour.stalled >= again;
   const bool faces_away = std::abs(command_.heading_error) > away;
-  // One that does not face away may stand for a moment only.
-  if (!faces_away && detour.standing < again) return;
-  // For one that stands there is what there was.
-  if (detour.searched > 0.0 && detour.standing - detour.searched < again) return;
-  detour.searched = detour.standing;
-  if (!(faces_away && turn_around()) && !go_back()) return;
+  if (!is_stuck) {
+    if (detour.standing == 0.0) return;
+    // Who does not know where the vehicle heads will know better soon, mostly; if not, it is motion that tells.
+    if (is_lost_ && detour.standing < patience) return;
+    // One that does not face away may stand for a moment only.
+    if (!faces_away && detour.standing < again) return;
+    // For one that stands there is what there was.
+    if (detour.searched > 0.0 && detour.standing - detour.searched < again) return;
+    detour.searched = detour.standing;
+  }
+  const Roles& roles = vehicle_->description().roles;
+  const double* const state = problem_.given_state();
+  if (is_stuck) follower_.reset(detour.turn.beside(path_, state[roles.position_x], state[roles.position_y]).arc_length);
+  if (std::abs(heading_error(follower_, state[roles.heading])) < detour.least_off - least_move)
+    detour.turns = detour.retreats = 0;
+  if (is_stuck) {
+    // It does not get to the end of a move: from where it is, there are others.
+    detour.margin = std::min(detour.margin * wider_again, most_margin);
+    if (!turn_in_moves()) detour.turn.end();
+  } else if (!(faces_away && turn_around()) && !((faces_away || obstacle_count_ == 0) && turn_in_moves()) &&
+             !go_back()) {
+    return;
+  }
   // The plan is one to stand.
   has_plan_ = false;
-  detour.standing = detour.searched = detour.rested = 0.0;
+  detour.standing = detour.searched = detour.rested = detour.stalled = 0.0;
 }
 
-/// Begins a way back to the path, as tight as the vehicle can turn. False: there is none.
-bool Controller::turn_around() noexcept {
+/// The tightest turn forwards (sense 1) or in reverse (-1), within the bounds of the last reference, of a vehicle that
+/// is where it is, at no more than a speed [m/s].
+TurningCircle Controller::tightest_turn(double speed, double sense) noexcept {
   const ModelDescription& about = vehicle_->description();
-  const double speed = detour_speed(path_, follower_.arc_length());
-  const double sense = points_[0].in_reverse ? -1.0 : 1.0;
   const int nu = vehicle_->input_count();
-  Approach::Turn best{.radius = infinity};
+  TurningCircle best{.radius = infinity};
   for (int trial = 1; trial < trials_of(nu); ++trial) {
     for (int i = 0; i < problem_.intervals(); ++i) {
       for (int j = 0; j < nu; ++j) {
@@ -243,17 +315,105 @@ bool Controller::turn_around() noexcept {
       }
     }
     simulate(relaxed_plan_);
-    const Approach::Turn found = tightest_turn(problem_, relaxed_plan_, speed, sense, detour_->margin);
+    const TurningCircle found = turn_in_trial(problem_, relaxed_plan_, speed, sense, detour_->margin);
     const bool is_faster = found.radius < (1.0 + tighter) * best.radius && found.speed > best.speed;
     if (found.radius < (1.0 - tighter) * best.radius || is_faster) best = found;
   }
+  return best;
+}
+
+/// Begins a way back to the path, as tight as the vehicle can turn. False: there is none.
+bool Controller::turn_around() noexcept {
+  const double speed = detour_speed(path_, follower_.arc_length());
+  const TurningCircle turn = tightest_turn(speed, goes_in_reverse(follower_) ? -1.0 : 1.0);
+  const Roles& roles = vehicle_->description().roles;
   const double* const state = problem_.given_state();
-  const Pose pose{state[about.roles.position_x], state[about.roles.position_y], state[about.roles.heading]};
+  const Pose pose{state[roles.position_x], state[roles.position_y], state[roles.heading]};
   Approach& approach = detour_->approach;
-  if (!approach.begin(path_, follower_.section(), follower_.arc_length(), pose, best)) return false;
-  if (approach_keeps_limits(now_)) return true;
+  if (!approach.begin(path_, follower_.section(), follower_.arc_length(), pose, turn)) return false;
+  if (!(limits_kept_until(approach.arc_length(), approach.target(), now_, true) < approach.target())) return true;
   approach.end();
   return false;
+}
+
+/// Whether what a state is off by stays as small, within the horizon, where the vehicle is driven straight ahead as by
+/// its last reference: a trailer folds in reverse.
+bool Controller::is_steady() noexcept {
+  const ModelDescription& about = vehicle_->description();
+  const int N = problem_.intervals(), nx = vehicle_->state_count(), nu = vehicle_->input_count();
+  double* const given = problem_.given_state();
+  std::swap_ranges(given, given + nx, problem_.state_reference(0));
+  const auto end_of = [&](int state) {
+    for (int i = 0; i < N; ++i)
+      for (int j = 0; j < nu; ++j) scratch_[static_cast<std::size_t>(i) * nu + j] = input_reference(i, j);
+    simulate(relaxed_plan_);
+    return relaxed_plan_.state(N)[state];
+  };
+  bool is_steady = true;
+  for (int k = 0; k < nx; ++k) {
+    if (k == about.roles.position_x || k == about.roles.position_y) continue;
+    const double is = given[k], off = small_change * about.states[static_cast<std::size_t>(k)].scale, end = end_of(k);
+    given[k] = is + off;
+    is_steady = is_steady && std::abs(end_of(k) - end) < steady_growth * off;
+    given[k] = is;
+  }
+  std::swap_ranges(given, given + nx, problem_.state_reference(0));
+  return is_steady;
+}
+
+/// Begins a turn in several moves, until the vehicle is aligned with the path, within limits and room. False: there is
+/// none, or it has helped nobody.
+bool Controller::turn_in_moves() noexcept {
+  Detour& detour = *detour_;
+  if (detour.turns == most_turns) return false;
+  const double speed = retreat_share * detour_speed(path_, follower_.arc_length());
+  const Roles& roles = vehicle_->description().roles;
+  const double* const state = problem_.given_state();
+  MultiPointTurn::Begin begin{.vehicle = {state[roles.position_x], state[roles.position_y], state[roles.heading]},
+                              .forwards = {},
+                              .backwards = {},
+                              .section = follower_.section(),
+                              .arc_length = follower_.arc_length()};
+  const double error = heading_error(follower_, state[roles.heading]);
+  MultiPointTurn best;
+  double least = infinity;
+  for (const bool in_reverse : {false, true}) {
+    // Bounds of inputs are those of a reference that leads this way.
+    begin.in_reverse = in_reverse;
+    TurningCircle& turn = in_reverse ? begin.backwards : begin.forwards;
+    turn = {.radius = 1.0, .speed = speed};
+    detour.turn.begin(begin);
+    detour.turn.add(std::numbers::pi);
+    set_reference(0.0, problem_.given_parameters(), now_);
+    problem_.finish(scratch_);
+    turn = is_steady() ? tightest_turn(speed, in_reverse ? -1.0 : 1.0) : TurningCircle{.radius = infinity};
+  }
+  for (const int rotation : {1, -1}) {
+    for (const bool in_reverse : {false, true}) {
+      begin.rotation = rotation;
+      begin.in_reverse = in_reverse;
+      detour.turn.begin(begin);
+      double left = -rotation * error;
+      if (left < 0.0) left += 2.0 * std::numbers::pi;
+      if (left > most_rotation) continue;
+      while (left > least_move && detour.turn.add(left)) {
+        const double from = detour.turn.last_start(), from_time = detour.turn.last_start_time();
+        detour.turn.end_last_at(
+            limits_kept_until(from, detour.turn.length(), now_ + from_time, detour.turn.moves() == 1));
+        if (!(detour.turn.last_angle() > least_move)) break;
+        left -= detour.turn.last_angle();
+      }
+      if (left > least_move || !(detour.turn.time() < least)) continue;
+      least = detour.turn.time();
+      best = detour.turn;
+    }
+  }
+  detour.turn = best;
+  detour.turn.set_off();
+  if (!detour.turn.is_under_way()) return false;
+  detour.turns++;
+  detour.note_place(error, follower_.arc_length() + speed * problem_.intervals() * setup_.interval);
+  return true;
 }
 
 /// Begins a retreat. False: there is none, or it would help nobody: one that waits for an obstacle stands where it is.
@@ -266,7 +426,7 @@ bool Controller::go_back() noexcept {
   // A vehicle that does not drive backwards, by its bounds, does not.
   const double* const state = problem_.given_state();
   const Roles& roles = vehicle_->description().roles;
-  const double sense = points_[0].in_reverse ? -1.0 : 1.0;
+  const double sense = goes_in_reverse(follower_) ? -1.0 : 1.0;
   set_reference(detour.retreat.arc_length(), problem_.given_parameters(), now_);
   problem_.finish(scratch_);  // with the bounds of this reference
   for (int i = 0; i < problem_.intervals(); ++i)
@@ -286,7 +446,7 @@ bool Controller::go_back() noexcept {
     return false;
   }
   detour.retreats++;
-  detour.regained = follower_.arc_length() + speed * problem_.intervals() * setup_.interval;
+  detour.note_place(command_.heading_error, follower_.arc_length() + speed * problem_.intervals() * setup_.interval);
   return true;
 }
 

@@ -1,8 +1,12 @@
 #pragma once
 
+#include <algorithm>
+#include <cmath>
+#include <numbers>
 #include <vector>
 
 #include "approach.hpp"
+#include "multi_point_turn.hpp"
 #include "retreat.hpp"
 
 namespace rhec {
@@ -15,23 +19,36 @@ struct Detour {
   static constexpr double arc_margin = 1.15;
 
   Approach approach;
+  MultiPointTurn turn;
   Retreat retreat;
   // For how long plans began with standing, the vehicle has stood, had when a way was last looked for, and has not
   // moved on on one [s].
   double rested = 0.0, standing = 0.0, searched = 0.0, stalled = 0.0;
-  double margin = arc_margin;                    ///< of arcs to turn around on, over the tightest
-  int retreats = 0;                              ///< so far, without a way on along the path behind them
+  double margin = arc_margin;   ///< of arcs to turn around on, over the tightest
+  int turns = 0, retreats = 0;  ///< turns in several moves, and ways back, that have begun since one has helped
+  // Where on the path the vehicle is farther on than before the last of them [m], and with what least heading error one
+  // has begun [rad]: beyond either it has helped.
+  double regained = 0.0, least_off = std::numbers::pi;
   std::vector<double> excess_now, excess_ahead;  ///< over limits of terms: of the vehicle, and on a way back
-  double regained = 0.0;  ///< where on the path the vehicle is farther on than before the last retreat [m]
+  double beyond_now = 0.0;                       ///< of the vehicle, over the path's room [m]
 
-  bool is_under_way() const noexcept { return approach.is_under_way() || retreat.is_under_way(); }
+  /// Another one begins.
+  void note_place(double heading_error, double farther_on) noexcept {
+    least_off = std::min(least_off, std::abs(heading_error));
+    regained = farther_on;
+  }
+  bool is_under_way() const noexcept {
+    return approach.is_under_way() || turn.is_under_way() || retreat.is_under_way();
+  }
   void forget() noexcept {
     approach.end();
+    turn.end();
     retreat.end();
     margin = arc_margin;
     rested = standing = searched = stalled = 0.0;
-    retreats = 0;
+    turns = retreats = 0;
     regained = 0.0;
+    least_off = std::numbers::pi;
   }
 };
 

@@ -17,16 +17,15 @@ double turn_of(double angle) noexcept {
   return angle > full_turn - rounding ? 0.0 : angle;
 }
 
-/// Where a vehicle is after a piece of a path: an arc if it turns.
-Pose after(const Pose& from, int turn, double length, double radius) noexcept {
+}  // namespace
+
+Pose pose_after(const Pose& from, int turn, double length, double radius) noexcept {
   if (turn == 0)
     return {from.x + length * std::cos(from.direction), from.y + length * std::sin(from.direction), from.direction};
   const double direction = from.direction + turn * length / radius;
   return {from.x + turn * radius * (std::sin(direction) - std::sin(from.direction)),
           from.y - turn * radius * (std::cos(direction) - std::cos(from.direction)), direction};
 }
-
-}  // namespace
 
 DubinsPath::DubinsPath(const Kind& kind, const Pose& from, const Pose& to, double radius) noexcept
     : kind_(kind), from_(from), radius_(radius) {
@@ -83,14 +82,14 @@ void DubinsPath::join_by_arc(const Pose& from, const Pose& to) noexcept {
 double DubinsPath::length() const noexcept { return lengths_[0] + lengths_[1] + lengths_[2]; }
 
 Pose DubinsPath::pose_at(double arc_length) const noexcept {
-  if (arc_length < 0.0) return after(from_, 0, arc_length, radius_);
+  if (arc_length < 0.0) return pose_after(from_, 0, arc_length, radius_);
   Pose pose = from_;
   for (std::size_t i = 0; i < 3; ++i) {
     const double way = std::fmin(arc_length, lengths_[i]);
-    pose = after(pose, kind_[i], way, radius_);
+    pose = pose_after(pose, kind_[i], way, radius_);
     arc_length -= way;
   }
-  return after(pose, 0, arc_length, radius_);
+  return pose_after(pose, 0, arc_length, radius_);
 }
 
 double DubinsPath::curvature_at(double arc_length) const noexcept {

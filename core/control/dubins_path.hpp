@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 
 namespace rhec {
 
@@ -8,6 +9,27 @@ namespace rhec {
 struct Pose {
   double x = 0.0, y = 0.0, direction = 0.0;
 };
+
+/// Where a vehicle is after a length [m] of an arc to the left (turn 1) or right (-1), or straight on (0).
+Pose pose_after(const Pose& from, int turn, double length, double radius) noexcept;
+
+/// The place of a way, whose poses a function says, that is closest to (x, y), of those between two arc lengths, and
+/// its distance [m].
+struct NearestPose {
+  double along = 0.0, distance = HUGE_VAL;
+};
+template <class PoseAt>
+NearestPose nearest_pose(const PoseAt& pose_at, double from, double to, double x, double y) noexcept {
+  constexpr int steps = 32;
+  NearestPose nearest{.along = from};
+  for (int i = 0; i <= steps; ++i) {
+    const double along = from + i * (to - from) / steps;
+    const Pose there = pose_at(along);
+    const double distance = std::hypot(x - there.x, y - there.y);
+    if (distance < nearest.distance) nearest = {along, distance};
+  }
+  return nearest;
+}
 
 /// A path of three pieces between two poses, each an arc of one radius or a straight line; the shortest path whose
 /// curvature nowhere exceeds that of the arcs is one of six of these kinds (L. E. Dubins, American Journal of

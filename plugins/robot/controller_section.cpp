@@ -157,9 +157,9 @@ const OptionTable<ControllerOptions>& ControllerOptions::table() {
           .number("speed_bound_offset", &C::speed_bound_offset, "[m/s]", or_infinite(at_least(0.0)))
           .flag(
               "turn_around", &C::turn_around,
-              "a vehicle that stands, since it looks away from the path and no plan turns it, drives a way back to it; "
-              "since limits keep it from going on, goes back along the path; without this it stands until somebody "
-              "moves it")
+              "a vehicle that stands, since it looks away from the path and no plan turns it, or since limits keep it "
+              "from going on, goes round, turns in several moves, or goes back along the path; without this it stands "
+              "until somebody moves it")
           .map("weights", &C::weights, WeightOptions::table().schema())
           .map("rate_bounds", &C::rate_bounds, rate_bounds_by_name().rows())
           .group("health", &C::health, PaceOptions::table())

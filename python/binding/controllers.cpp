@@ -195,10 +195,10 @@ void bind_commands(py::module_& module) {
           "the vehicle faces away from the path, and stands until somebody turns it")
       .def_property_readonly(
           "turns_around", [](const CommandObject& self) { return self.value.turns_around; },
-          "the vehicle drives a way back to the path, from which it has looked away")
+          "the vehicle, which looks away from the path, goes round, or turns in several moves")
       .def_property_readonly(
           "goes_back", [](const CommandObject& self) { return self.value.goes_back; },
-          "the vehicle goes back along the path, since its limits keep it from going on")
+          "the vehicle moves against the path's direction: back along it, or in a move of a turn in several ones")
       .def_property_readonly(
           "stands", [](const CommandObject& self) { return self.value.stands; },
           "the plan is to stand where the path goes on")

@@ -11,7 +11,7 @@ namespace approach_test {
 
 constexpr double pi = std::numbers::pi;
 constexpr double speed = 1.2, radius = 3.0;
-const Approach::Turn turn{.radius = radius, .speed = speed};
+const TurningCircle turn{.radius = radius, .speed = speed};
 
 Path straight(double velocity, double room = infinity) {
   Waypoint first, last;

@@ -17,6 +17,7 @@
 namespace rhec {
 
 struct Detour;
+struct TurningCircle;
 
 enum class ReferenceSpeed {
   ground,  ///< the path's speed is over ground: the wheels turn faster by the estimated slip
@@ -29,17 +30,14 @@ enum class ReferenceSpeed {
 /// on the closest point of the path is searched for ahead of the last one. The local reference is that point and those
 /// that a vehicle passes in N_c intervals from there at the path's speeds: it brakes in time for what comes, and goes
 /// through stops, where it may change its direction. If the solver fails, and fails again from a simulation, the
-/// plan of the last sample is continued and the failure is counted: its inputs one after the other, then the last of
-/// them. Without a plan the vehicle goes straight ahead. Where a map knows the slip that is ahead, the plan and its
-/// reference count with it.
+/// plan of the last sample is continued to its last input, and the failure is counted. Without a plan the vehicle goes
+/// straight ahead. Where a map knows the slip that is ahead, the plan and its reference count with it.
 ///
-/// Rates of inputs, (u_i - u_{i-1}) / dt with the input applied last as u_{-1}, can have weights and bounds. The
-/// problem is then that of an InputRateModel. Before the first command u_{-1} is what drives straight ahead, unless
-/// `applied` has said what it is.
+/// Rates of inputs, (u_i - u_{i-1}) / dt, can have weights and bounds, in the problem of an InputRateModel. u_{-1} is
+/// the input applied last; before the first command, what drives straight ahead, unless `applied` has said what it is.
 ///
-/// A vehicle that looks away from the path, and that no plan within the horizon turns, goes round: its reference is the
-/// shortest way back to the path by arcs that it can drive, as its model says, until it is there. One that its limits
-/// keep from going on, looking out of them, goes back along the path until it is aligned (docs/paths.md).
+/// A vehicle that looks away from the path, or that limits keep from going on, goes round by arcs that it can drive,
+/// turns in several moves, or goes back along the path until it is aligned (docs/paths.md).
 ///
 /// Terms of the problem (RhcProblem::Setup) get the reference of each node, and the obstacles of `set_obstacles`.
 /// Allocates in its constructor only.
@@ -84,13 +82,13 @@ class RHEC_EXPORT Controller {
     double heading_error = 0.0;  ///< heading of the estimate - that of the reference, in (-pi, pi] [rad]
     bool relaxed = false;        ///< a state bound was out of reach from the estimate and was relaxed
     double pace = 1.0;           ///< share of the path's speeds that is driven at present
-    /// The vehicle faces away from the path, and its plan is to stand. It does not turn around either, since it shall
-    /// not, cannot, or has no room to: it stays there until somebody turns it, or the path is another.
+    /// The vehicle faces away from the path and stands: it shall not turn around, cannot, or has no room to. It stays
+    /// there until somebody turns it, or the path is another.
     bool faces_away = false;
-    bool turns_around = false;  ///< the reference is a way back to the path, which the vehicle has looked away from
-    bool goes_back = false;  ///< the reference is the path, backwards, since the vehicle's limits keep it from going on
-    /// The plan is to stand where the path goes on, or has begun with that for five seconds: it covers less than a
-    /// tenth of the way that it should. Something is in the way, limits leave no other, or the vehicle faces away.
+    bool turns_around = false;  ///< the reference is a way round, or a turn in several moves
+    bool goes_back = false;     ///< it leads against the path's direction: along the path, or in a move of that turn
+    /// The plan covers less than a tenth of the way that it should, or has begun with standing for five seconds:
+    /// something is in the way, limits leave no other, or the vehicle faces away.
     bool stands = false;
     /// By limit of the terms (TermFunctions::limit_names), how far what follows next is beyond it: the plan's first
     /// interval and the node at its end; 0: it is kept. Of this sample from `finish` on.
@@ -101,8 +99,8 @@ class RHEC_EXPORT Controller {
   /// Completes the last command's report with the objective and the KKT residual of its plan, and its violations.
   /// `prepare` and the next `control` do that too; only the last command of a run needs this call.
   void finish() noexcept;
-  /// Says which inputs (n_u) the vehicle has had until now, where they are not the last command: at the start, or after
-  /// it was driven by hand. Matters to rates alone. NaN: the last command, or what drives straight ahead.
+  /// Says which inputs (n_u) the vehicle has had, where they are not the last command, as when it was driven by hand.
+  /// Matters to rates alone. NaN: the last command, or what drives straight ahead.
   void applied(const double* inputs) noexcept;
   /// Searches the whole path for the vehicle at the next call, as at the first one.
   void locate() noexcept;
@@ -113,8 +111,7 @@ class RHEC_EXPORT Controller {
   /// where the vehicle is on the path. Returns how many they are. They move on with their velocities. One that has a
   /// number that is not finite is left out; at a time that is not, all are at rest.
   int set_obstacles(std::span<const Obstacle> obstacles, double time) noexcept;
-  /// Does work for the next sample in advance; calling it is optional.
-  void prepare() noexcept;
+  void prepare() noexcept;  ///< does work for the next sample in advance; calling it is optional
   void reset() noexcept;
 
   /// True once the vehicle has passed the end of the path, or has come to a stop there.
@@ -126,7 +123,7 @@ class RHEC_EXPORT Controller {
   const Command& command() const noexcept { return command_; }  ///< the last one
   /// The vehicle itself; the problem's model has further states if there are rates.
   const Model& vehicle() const noexcept { return *vehicle_; }
-  // The vehicle's inputs (n_u) in the plan and its reference on an interval, and the bounds of one.
+  // The vehicle's inputs (n_u) in the plan and its reference on an interval, and an input's bounds.
   void plan_inputs(int interval, double* inputs) const noexcept;
   double input_reference(int interval, int input) const noexcept;
   double input_lower(int input) const noexcept;
@@ -142,6 +139,7 @@ class RHEC_EXPORT Controller {
   void find_points(double arc_length) noexcept;
   void bound_speed() noexcept;
   void set_reference(double arc_length, const double* parameters, double time) noexcept;
+  void place_terms(int node, int point, double time) noexcept;
   void look_ahead(double arc_length, const double* parameters) noexcept;
   void write_held_inputs() noexcept;
   void start_cold() noexcept;
@@ -156,14 +154,17 @@ class RHEC_EXPORT Controller {
   bool plans_to_stand(int intervals) const noexcept;
   void note_standing(const Health& health) noexcept;
   void find_excess(int last, std::vector<double>& most) const noexcept;
-  bool approach_keeps_limits(double time) noexcept;
+  double limits_kept_until(double from, double to, double time, bool is_begin) noexcept;
   double arc_length() const noexcept;
   double arc_length_after(double arc_length, double time, int& segment) const noexcept;
   PathPoint point_at(double arc_length, int& segment) const noexcept;
   void simulate(Iterate& point) noexcept;
   bool goes_on_detour(const Estimate& estimate) noexcept;
   void look_for_detour() noexcept;
+  TurningCircle tightest_turn(double speed, double sense) noexcept;
   bool turn_around() noexcept;
+  bool is_steady() noexcept;
+  bool turn_in_moves() noexcept;
   bool go_back() noexcept;
 
   Setup setup_;
@@ -182,16 +183,15 @@ class RHEC_EXPORT Controller {
   bool is_finished_ = true, is_located_ = false;  ///< the last plan was assessed; the place on the path is known
   // For which the inputs' bounds were made [m/s].
   double bounded_forwards_ = std::numeric_limits<double>::quiet_NaN(), bounded_in_reverse_ = bounded_forwards_;
-  int reference_segment_ = 0;        ///< segment of the path where the last reference began
-  std::vector<PathPoint> points_;    ///< N_c + 1: the reference
-  std::vector<double> arc_lengths_;  ///< of these [m]
+  int reference_segment_ = 0;                             ///< segment of the path where the last reference began
+  std::vector<PathPoint> points_;                         ///< N_c + 1: the reference
+  std::vector<double> arc_lengths_, obstacle_distances_;  ///< of these; of the obstacles from the plan [m]
   std::int64_t fallbacks_ = 0;
   std::vector<double> scratch_, straight_, slipless_, largest_, smallest_, limit_values_;
   std::vector<double> nominal_parameters_, reference_parameters_, ahead_parameters_;
   std::vector<double> last_inputs_;            ///< n_u, applied last; NaN: not known
   std::vector<std::uint8_t> begins_, drives_;  ///< n_u: whether an input moves the vehicle that drives straight ahead
   std::vector<Obstacle> obstacles_;  ///< room for as many as the terms regard; the first `obstacle_count_` are there
-  std::vector<double> obstacle_distances_;  ///< of these from the plan [m]
   std::size_t obstacle_count_ = 0;
   double pace_ = 1.0, wanted_pace_ = 1.0;  ///< share of the path's speeds
   double seen_ = 0.0, now_ = 0.0;          ///< when the obstacles were there; time of the last estimate [s]
