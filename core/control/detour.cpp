@@ -274,8 +274,8 @@ void Controller::look_for_detour() noexcept {
     if (detour.standing == 0.0) return;
     // Who does not know where the vehicle heads will know better soon, mostly; if not, it is motion that tells.
     if (is_lost_ && detour.standing < patience) return;
-    // One that does not face away may stand for a moment only.
-    if (!faces_away && detour.standing < again) return;
+    // One that does not face away may stand for a moment only, and on its way round for as long as that may last.
+    if (!faces_away && (detour.standing < again || detour.approach.is_under_way())) return;
     // For one that stands there is what there was.
     if (detour.searched > 0.0 && detour.standing - detour.searched < again) return;
     detour.searched = detour.standing;
