@@ -30,6 +30,20 @@ std::unique_ptr<Controller> controller_on(const Path& path, const std::string& c
   return robot.make_controller(path);
 }
 
+/// A vehicle with the slip of its estimate obeys a command for a sample; the estimate is the truth.
+void drive(const Model& model, const Controller::Command& command, Estimate& estimate) {
+  const double step = 0.2;
+  Eigen::VectorXd next(model.state_count());
+  model.integrate({.count = 1,
+                   .states = estimate.state.data(),
+                   .inputs = command.inputs.data(),
+                   .parameters = estimate.parameters.data(),
+                   .durations = &step,
+                   .next_states = next.data()});
+  estimate.state = next;
+  estimate.time += step;
+}
+
 /// Follows the diagonal for so many samples from its tenth metre, looking off the path by an angle, without slip.
 struct Turned {
   bool ever = false, now = false;  ///< facing away, by what the commands say
@@ -50,7 +64,7 @@ Turned turned(const std::string& configuration, double angle, int samples, doubl
   const Roles& roles = model.description().roles;
   Estimate estimate;
   estimate.state = Eigen::VectorXd::Zero(model.state_count());
-  const double start = 10.0 / std::numbers::sqrt2, step = 0.2;
+  const double start = 10.0 / std::numbers::sqrt2;
   roles.place(start - aside / std::numbers::sqrt2, start + aside / std::numbers::sqrt2, 0.25 * std::numbers::pi + angle,
               estimate.state.data());
   estimate.parameters = Eigen::Map<const Eigen::VectorXd>(slip.data(), static_cast<Eigen::Index>(slip.size()));
@@ -69,15 +83,7 @@ Turned turned(const std::string& configuration, double angle, int samples, doubl
     told.turning += command.turns_around;
     told.back += command.goes_back;
     told.stands = command.stands;
-    Eigen::VectorXd next(model.state_count());
-    model.integrate({.count = 1,
-                     .states = estimate.state.data(),
-                     .inputs = command.inputs.data(),
-                     .parameters = slip.data(),
-                     .durations = &step,
-                     .next_states = next.data()});
-    estimate.state = next;
-    estimate.time += step;
+    drive(model, command, estimate);
     controller->prepare();
     told.beside = (estimate.state[roles.position_y] - estimate.state[roles.position_x]) / std::numbers::sqrt2;
     told.farthest = std::max(told.farthest, std::abs(told.beside));
@@ -197,17 +203,8 @@ TEST(TurnAround, InSeveralMovesWithinTheRoomOfAPath) {
       turning += command.turns_around;
       back += command.goes_back;
       both_ways += command.turns_around && !command.goes_back;
-      const double step = 0.2;
-      Eigen::VectorXd next(model.state_count());
-      model.integrate({.count = 1,
-                       .states = estimate.state.data(),
-                       .inputs = command.inputs.data(),
-                       .parameters = slip.data(),
-                       .durations = &step,
-                       .next_states = next.data()});
-      estimate.state = next;
-      estimate.time += step;
-      farthest = std::max(farthest, std::abs(next[1]));
+      drive(model, command, estimate);
+      farthest = std::max(farthest, std::abs(estimate.state[1]));
     }
     EXPECT_GT(turning, 20) << speed;
     EXPECT_GT(back, 5) << speed;
