@@ -255,9 +255,9 @@ double Controller::limits_kept_until(double from, double to, double time, bool i
       if (!is_kept) return i > 0 ? arc_lengths_[i - 1] : at;
     }
     is_begin = false;
-    const double next = arc_lengths_[N];
-    if (!(next > at)) break;
-    at = next;
+    // At no pace the reference stays: of what follows nothing is known.
+    if (!(arc_lengths_[N] > at)) return at;
+    at = arc_lengths_[N];
     time += N * setup_.interval;
   }
   return to;
