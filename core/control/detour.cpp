@@ -350,11 +350,11 @@ bool Controller::is_steady() noexcept {
     return relaxed_plan_.state(N)[state];
   };
   bool is_steady = true;
-  for (int k = 0; k < nx; ++k) {
+  for (int k = 0; k < nx && is_steady; ++k) {
     if (k == about.roles.position_x || k == about.roles.position_y) continue;
     const double is = given[k], off = small_change * about.states[static_cast<std::size_t>(k)].scale, end = end_of(k);
     given[k] = is + off;
-    is_steady = is_steady && std::abs(end_of(k) - end) < steady_growth * off;
+    is_steady = std::abs(end_of(k) - end) < steady_growth * off;
     given[k] = is;
   }
   std::swap_ranges(given, given + nx, problem_.state_reference(0));
