@@ -29,7 +29,7 @@ bool Approach::begin(const Path& path, int section, double arc_length, const Pos
                      const TurningCircle& turn) noexcept {
   is_under_way_ = false;
   if (!(turn.radius > 0.0) || !(turn.speed > 0.0) || !std::isfinite(turn.radius)) return false;
-  if (!std::isfinite(vehicle.x) || !std::isfinite(vehicle.y) || !std::isfinite(vehicle.direction)) return false;
+  if (!is_finite(vehicle)) return false;
   turn_ = turn;
   first_ = path.section_start(section);
   last_ = path.section_end(section);
@@ -78,14 +78,24 @@ bool Approach::has_room(const Path& path) const noexcept {
   return true;
 }
 
-void Approach::advance(double x, double y, double heading) noexcept {
-  if (!is_under_way_ || !std::isfinite(x) || !std::isfinite(y)) return;
+bool Approach::advance(const Path& /*path*/, const Pose& vehicle, double /*time*/) noexcept {
+  if (!is_under_way_ || !is_finite(vehicle)) return false;
   const NearestPose nearest = nearest_pose([&](double along) { return way_.pose_at(along); }, done_,
-                                           done_ + search_window * turn_.radius, x, y);
+                                           done_ + search_window * turn_.radius, vehicle.x, vehicle.y);
   done_ = nearest.along;
-  const double direction = heading + (in_reverse_ ? std::numbers::pi : 0.0);
+  const double direction = vehicle.direction + (in_reverse_ ? std::numbers::pi : 0.0);
   const double off = std::abs(angle_difference(direction, way_.pose_at(done_).direction));
   is_under_way_ = !has_arrived() && off < most_off && nearest.distance < most_beside * turn_.radius;
+  return false;
+}
+
+double Approach::path_beside(const Path& path, double arc_length) const noexcept {
+  const PathPoint there = point_at(path, arc_length);
+  return beside(path, there.x, there.y).arc_length;
+}
+
+std::optional<double> Approach::goes_on_at(const Path& /*path*/, double /*x*/, double /*y*/) const noexcept {
+  return has_arrived() ? std::optional(target_) : std::nullopt;
 }
 
 double Approach::arc_length_after(double arc_length, double time) const noexcept {

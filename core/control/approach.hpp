@@ -1,5 +1,6 @@
 #pragma once
 
+#include "detour_way.hpp"
 #include "dubins_path.hpp"
 #include "rhec/core/control/path.hpp"
 
@@ -20,24 +21,26 @@ double beyond_room(const Path& path, const PathProjection& place) noexcept;
 /// is driven at one speed, in the direction of the path there: in reverse where the path is.
 ///
 /// Its places are counted as if it were the end of the path: the arc length at its end is that of the path there, and
-/// from there on it is the path. Neither allocates nor throws.
-class Approach {
+/// from there on it is the path.
+class Approach final : public DetourWay {
  public:
   /// Begins where the vehicle is, with its heading, to the path at an arc length or further on in that section. Where
   /// the path has room beside it, the way keeps to it as far as the vehicle does now. False: there is no such way.
   bool begin(const Path& path, int section, double arc_length, const Pose& vehicle, const TurningCircle& turn) noexcept;
-  void end() noexcept { is_under_way_ = false; }
-  bool is_under_way() const noexcept { return is_under_way_; }
+  void end() noexcept override { is_under_way_ = false; }
+  bool is_under_way() const noexcept override { return is_under_way_; }
 
-  /// Moves on with the vehicle. The approach has ended if it has arrived at its end, or is not on its way any more: it
-  /// looks away from that, too, or is elsewhere, as where an estimate has jumped.
-  void advance(double x, double y, double heading) noexcept;
-  bool has_arrived() const noexcept { return done_ >= way_.length(); }
+  /// A vehicle that is not on its way any more looks away from that, too, or is elsewhere, as where an estimate has
+  /// jumped.
+  bool advance(const Path& path, const Pose& vehicle, double time) noexcept override;
+  bool has_arrived() const noexcept override { return done_ >= way_.length(); }
   /// Where the vehicle is, and where the approach ends [m].
-  double arc_length() const noexcept { return target_ - way_.length() + done_; }
+  double arc_length() const noexcept override { return target_ - way_.length() + done_; }
   double target() const noexcept { return target_; }
-  double arc_length_after(double arc_length, double time) const noexcept;
-  PathPoint point_at(const Path& path, double arc_length) const noexcept;
+  double arc_length_after(double arc_length, double time) const noexcept override;
+  PathPoint point_at(const Path& path, double arc_length) const noexcept override;
+  double path_beside(const Path& path, double arc_length) const noexcept override;
+  std::optional<double> goes_on_at(const Path& path, double x, double y) const noexcept override;
   /// The place of the path that is closest to one of this way.
   PathProjection beside(const Path& path, double x, double y) const noexcept;
 

@@ -178,6 +178,7 @@ Controller::Controller(std::shared_ptr<const Model> model, std::shared_ptr<Solve
   const Model& vehicle = *vehicle_;
   command_.inputs.assign(vehicle.input_count(), 0.0);
   detour_->forget();
+  detour_->undisturbed.assign(static_cast<std::size_t>(vehicle.state_count()), 0.0);
   if (const TermFunctions* terms = problem_.terms().functions(); terms && terms->limit_count() > 0) {
     for (auto* excess : {&command_.violations, &detour_->excess_now, &detour_->excess_ahead})
       excess->assign(static_cast<std::size_t>(terms->limit_count()), 0.0);
@@ -395,12 +396,10 @@ void Controller::set_reference(double arc_length, const double* parameters, doub
 /// Says to the terms of a node what is at a point of the reference. Their limits are beside the path, also where the
 /// reference is a way back to it, or backwards.
 void Controller::place_terms(int node, int point, double time) noexcept {
-  const Detour& detour = *detour_;
+  const DetourWay* const way = detour_->way();
   const PathPoint& target = points_[point];
-  const double along = detour.approach.is_under_way() ? detour.approach.beside(path_, target.x, target.y).arc_length
-                       : detour.turn.is_under_way()   ? detour.turn.beside(path_, target.x, target.y).arc_length
-                                                      : arc_lengths_[point];
-  const PathPoint place = detour.is_under_way() ? path_.point_at(along) : target;
+  const double along = way ? way->path_beside(path_, arc_lengths_[point]) : arc_lengths_[point];
+  const PathPoint place = way ? path_.point_at(along) : target;
   problem_.terms().place(node, {.time = time + point * setup_.interval,
                                 .x = place.x,
                                 .y = place.y,

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
 
 #include "detour.hpp"
 #include "rhec/core/base/angle.hpp"
@@ -118,68 +119,41 @@ double heading_error(const PathFollower& follower, double heading) noexcept {
 
 /// Where the vehicle is on the path, or on what it drives in place of it.
 double Controller::arc_length() const noexcept {
-  const Detour& detour = *detour_;
-  return detour.approach.is_under_way()  ? detour.approach.arc_length()
-         : detour.turn.is_under_way()    ? detour.turn.arc_length()
-         : detour.retreat.is_under_way() ? detour.retreat.arc_length()
-                                         : follower_.arc_length();
+  const DetourWay* const way = detour_->way();
+  return way ? way->arc_length() : follower_.arc_length();
 }
 
 double Controller::arc_length_after(double arc_length, double time, int& segment) const noexcept {
-  const Detour& detour = *detour_;
-  return detour.approach.is_under_way()  ? detour.approach.arc_length_after(arc_length, time)
-         : detour.turn.is_under_way()    ? detour.turn.arc_length_after(arc_length, time)
-         : detour.retreat.is_under_way() ? detour.retreat.arc_length_after(arc_length, time)
-                                         : path_.arc_length_after(arc_length, time, segment);
+  const DetourWay* const way = detour_->way();
+  return way ? way->arc_length_after(arc_length, time) : path_.arc_length_after(arc_length, time, segment);
 }
 
 PathPoint Controller::point_at(double arc_length, int& segment) const noexcept {
-  const Detour& detour = *detour_;
-  return detour.approach.is_under_way()  ? detour.approach.point_at(path_, arc_length)
-         : detour.turn.is_under_way()    ? detour.turn.point_at(arc_length)
-         : detour.retreat.is_under_way() ? detour.retreat.point_at(path_, arc_length)
-                                         : path_.point_at(arc_length, segment);
+  const DetourWay* const way = detour_->way();
+  return way ? way->point_at(path_, arc_length) : path_.point_at(arc_length, segment);
 }
 
 /// Moves on with the vehicle on its detour. False: it is on none, has come to its end, or does not get along.
 bool Controller::goes_on_detour(const Estimate& estimate) noexcept {
   Detour& detour = *detour_;
-  if (!detour.is_under_way()) return false;
+  DetourWay* const way = detour.way();
+  if (!way) return false;
   const Roles& roles = vehicle_->description().roles;
-  const double x = estimate.state[roles.position_x], y = estimate.state[roles.position_y],
-               heading = estimate.state[roles.heading];
-  const bool goes_round = detour.approach.is_under_way(), turns = detour.turn.is_under_way();
-  const double before = arc_length();
-  if (goes_round)
-    detour.approach.advance(x, y, heading);
-  else if (!turns)
-    detour.retreat.advance(path_, x, y, heading);
-  else if (detour.turn.advance(x, y, heading, setup_.interval))
-    has_plan_ = false;  // it leads the other way
-  const double after = goes_round ? detour.approach.arc_length()
-                       : turns    ? detour.turn.arc_length()
-                                  : detour.retreat.arc_length();
+  const Pose vehicle{estimate.state[roles.position_x], estimate.state[roles.position_y], estimate.state[roles.heading]};
+  const double before = way->arc_length();
+  if (way->advance(path_, vehicle, setup_.interval)) has_plan_ = false;
   const double least = least_wanted * setup_.interval * path_.top_speed();
-  const bool gets_along = std::abs(after - before) > least * pace_ || pace_ == 0.0 || detour.turn.waits();
+  const bool gets_along = std::abs(way->arc_length() - before) > least * pace_ || pace_ == 0.0 || way->waits();
   detour.stalled = gets_along ? 0.0 : detour.stalled + setup_.interval;
-  if (detour.is_under_way() && (turns || detour.stalled < patience)) return true;
-  if (goes_round || turns) {
-    const bool has_arrived = goes_round ? detour.approach.has_arrived() : detour.turn.has_arrived();
-    if (turns)
-      follower_.reset(detour.turn.beside(path_, x, y).arc_length);
-    else if (has_arrived)
-      follower_.reset(detour.approach.target());
-    if (has_arrived)
-      detour.margin = Detour::arc_margin;
-    else if (goes_round)
-      detour.margin = std::min(detour.margin * wider_again, most_margin);
-  } else {
-    follower_.reset(after);
-  }
-  if (!goes_round) has_plan_ = false;  // it leads back
-  detour.approach.end();
-  detour.turn.end();
-  detour.retreat.end();
+  // A turn in moves on which the vehicle is stuck is planned anew.
+  if (way->is_under_way() && (way == &detour.turn || detour.stalled < patience)) return true;
+  if (const std::optional<double> place = way->goes_on_at(path_, vehicle.x, vehicle.y)) follower_.reset(*place);
+  if (way->has_arrived())
+    detour.margin = Detour::arc_margin;
+  else if (way == &detour.approach)
+    detour.margin = std::min(detour.margin * wider_again, most_margin);
+  if (way != &detour.approach) has_plan_ = false;  // it leads back
+  way->end();
   detour.stalled = 0.0;
   return false;
 }
@@ -202,14 +176,14 @@ bool Controller::plans_to_stand(int intervals) const noexcept {
 void Controller::note_standing(const Health& health) noexcept {
   Detour& detour = *detour_;
   is_lost_ = health.level == HealthLevel::lost;
-  command_.turns_around = detour.approach.is_under_way() || detour.turn.is_under_way();
-  command_.goes_back = detour.retreat.is_under_way() ||
-                       (detour.turn.is_under_way() && detour.turn.in_reverse() != goes_in_reverse(follower_));
+  const DetourWay* const way = detour.way();
+  command_.turns_around = way && way != &detour.retreat;
+  command_.goes_back = way && way->point_at(path_, way->arc_length()).in_reverse != goes_in_reverse(follower_);
   // A plan may be to drive on later, in each sample anew: a way on is looked for soon.
   detour.rested = plans_to_stand(1) ? detour.rested + setup_.interval : 0.0;
   command_.stands = plans_to_stand(problem_.intervals()) || detour.rested > patience;
   const bool stands = (command_.stands || detour.rested > again) && vehicle_->description().roles.heading >= 0 &&
-                      !detour.retreat.is_under_way() && !detour.turn.is_under_way();
+                      (!way || way == &detour.approach);
   detour.standing = stands ? detour.standing + setup_.interval : 0.0;
   if (!stands) detour.searched = 0.0;
   if (follower_.arc_length() > detour.regained) {
@@ -343,18 +317,21 @@ bool Controller::is_steady() noexcept {
   const int N = problem_.intervals(), nx = vehicle_->state_count(), nu = vehicle_->input_count();
   double* const given = problem_.given_state();
   std::swap_ranges(given, given + nx, problem_.state_reference(0));
-  const auto end_of = [&](int state) {
+  const auto drive = [&] {
     for (int i = 0; i < N; ++i)
       for (int j = 0; j < nu; ++j) scratch_[static_cast<std::size_t>(i) * nu + j] = input_reference(i, j);
     simulate(relaxed_plan_);
-    return relaxed_plan_.state(N)[state];
+    return relaxed_plan_.state(N);
   };
+  std::vector<double>& undisturbed = detour_->undisturbed;
+  std::copy_n(drive(), nx, undisturbed.data());
   bool is_steady = true;
   for (int k = 0; k < nx && is_steady; ++k) {
     if (k == about.roles.position_x || k == about.roles.position_y) continue;
-    const double is = given[k], off = small_change * about.states[static_cast<std::size_t>(k)].scale, end = end_of(k);
+    const auto at = static_cast<std::size_t>(k);
+    const double is = given[k], off = small_change * about.states[at].scale;
     given[k] = is + off;
-    is_steady = std::abs(end_of(k) - end) < steady_growth * off;
+    is_steady = std::abs(drive()[k] - undisturbed[at]) < steady_growth * off;
     given[k] = is;
   }
   std::swap_ranges(given, given + nx, problem_.state_reference(0));

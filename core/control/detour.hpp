@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "approach.hpp"
+#include "detour_way.hpp"
 #include "multi_point_turn.hpp"
 #include "retreat.hpp"
 
@@ -30,6 +31,7 @@ struct Detour {
   // has begun [rad]: beyond either it has helped.
   double regained = 0.0, least_off = std::numbers::pi;
   std::vector<double> excess_now, excess_ahead;  ///< over limits of terms: of the vehicle, and on a way back
+  std::vector<double> undisturbed;               ///< n_x, at the end of a drive straight ahead
   double beyond_now = 0.0;                       ///< of the vehicle, over the path's room [m]
 
   /// Another one begins.
@@ -37,13 +39,15 @@ struct Detour {
     least_off = std::min(least_off, std::abs(heading_error));
     regained = farther_on;
   }
-  bool is_under_way() const noexcept {
-    return approach.is_under_way() || turn.is_under_way() || retreat.is_under_way();
+  /// The way that is being driven, of which there is one at most; null: none.
+  DetourWay* way() noexcept {
+    for (DetourWay* each :
+         {static_cast<DetourWay*>(&approach), static_cast<DetourWay*>(&turn), static_cast<DetourWay*>(&retreat)})
+      if (each->is_under_way()) return each;
+    return nullptr;
   }
   void forget() noexcept {
-    approach.end();
-    turn.end();
-    retreat.end();
+    if (DetourWay* const driven = way()) driven->end();
     margin = arc_margin;
     rested = standing = searched = stalled = 0.0;
     turns = retreats = 0;

@@ -9,6 +9,9 @@ namespace rhec {
 struct Pose {
   double x = 0.0, y = 0.0, direction = 0.0;
 };
+inline bool is_finite(const Pose& it) noexcept {
+  return std::isfinite(it.x) && std::isfinite(it.y) && std::isfinite(it.direction);
+}
 
 /// Where a vehicle is after a length [m] of an arc to the left (turn 1) or right (-1), or straight on (0).
 Pose pose_after(const Pose& from, int turn, double length, double radius) noexcept;

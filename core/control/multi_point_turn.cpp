@@ -74,14 +74,14 @@ Pose MultiPointTurn::pose_at(int move, double arc_length) const noexcept {
   return pose_after(start, begin_.rotation, arc_length - start_of(move), turn_of(move).radius);
 }
 
-bool MultiPointTurn::advance(double x, double y, double heading, double time) noexcept {
-  if (!is_under_way() || !std::isfinite(x) || !std::isfinite(y) || !std::isfinite(heading)) return false;
+bool MultiPointTurn::advance(const Path& /*path*/, const Pose& vehicle, double time) noexcept {
+  if (!is_under_way() || !is_finite(vehicle)) return false;
   wait_ = std::max(0.0, wait_ - time);
   const double radius = turn_of(move_).radius, end = ends_[static_cast<std::size_t>(move_)];
   const NearestPose nearest = nearest_pose([&](double along) { return pose_at(move_, along); }, done_,
-                                           std::min(done_ + search_ahead * radius, end), x, y);
+                                           std::min(done_ + search_ahead * radius, end), vehicle.x, vehicle.y);
   done_ = nearest.along;
-  const double direction = heading + (is_reverse(move_) ? std::numbers::pi : 0.0);
+  const double direction = vehicle.direction + (is_reverse(move_) ? std::numbers::pi : 0.0);
   const double off = std::abs(angle_difference(direction, pose_at(move_, done_).direction));
   if (off > farthest_off || nearest.distance > farthest_aside * radius) {
     this->end();
@@ -100,7 +100,7 @@ double MultiPointTurn::arc_length_after(double arc_length, double time) const no
                   std::max(arc_length, ends_[static_cast<std::size_t>(move)]));
 }
 
-PathPoint MultiPointTurn::point_at(double arc_length) const noexcept {
+PathPoint MultiPointTurn::point_at(const Path& /*path*/, double arc_length) const noexcept {
   const int move = move_at(arc_length);
   const bool in_reverse = is_reverse(move);
   const Pose pose = pose_at(move, arc_length);
@@ -123,6 +123,15 @@ PathProjection MultiPointTurn::beside(const Path& path, double x, double y) cons
   const double first = path.section_start(begin_.section), last = path.section_end(begin_.section);
   const double from = std::min(std::max(first, begin_.arc_length - reach), last);
   return path.closest(x, y, from, std::max(from, std::min(last, begin_.arc_length + reach)));
+}
+
+double MultiPointTurn::path_beside(const Path& path, double arc_length) const noexcept {
+  const PathPoint there = point_at(path, arc_length);
+  return beside(path, there.x, there.y).arc_length;
+}
+
+std::optional<double> MultiPointTurn::goes_on_at(const Path& path, double x, double y) const noexcept {
+  return beside(path, x, y).arc_length;
 }
 
 }  // namespace rhec

@@ -3,6 +3,7 @@
 #include <array>
 
 #include "approach.hpp"
+#include "detour_way.hpp"
 #include "dubins_path.hpp"
 #include "rhec/core/control/path.hpp"
 
@@ -12,9 +13,8 @@ namespace rhec {
 /// turns, all of which turn its heading in one sense. How far each of them leads is for its user to say, who knows the
 /// limits.
 ///
-/// Its places are arc lengths over all moves [m]. A move is driven to its end before the next one begins. Neither
-/// allocates nor throws.
-class MultiPointTurn {
+/// Its places are arc lengths over all moves [m]. A move is driven to its end before the next one begins.
+class MultiPointTurn final : public DetourWay {
  public:
   static constexpr int most_moves = 32;
   /// A move is over where less than this is left of it [m].
@@ -38,9 +38,9 @@ class MultiPointTurn {
   void end_last_at(double arc_length) noexcept;
   /// The first move is the one to be driven.
   void set_off() noexcept;
-  void end() noexcept { move_ = count_ = 0; }
-  bool is_under_way() const noexcept { return move_ < count_; }
-  bool has_arrived() const noexcept { return count_ > 0 && move_ == count_; }
+  void end() noexcept override { move_ = count_ = 0; }
+  bool is_under_way() const noexcept override { return move_ < count_; }
+  bool has_arrived() const noexcept override { return count_ > 0 && move_ == count_; }
   int moves() const noexcept { return count_; }
   bool in_reverse() const noexcept { return is_under_way() && is_reverse(move_); }  ///< the move that is being driven
 
@@ -51,17 +51,18 @@ class MultiPointTurn {
   double last_start_time() const noexcept { return time_of(count_ - 1); }  ///< [s]
   double time() const noexcept { return time_of(count_); }                 ///< for all moves [s]
 
-  /// Moves on with the vehicle, for which a time has passed [s]. It ends after the last move, or where the vehicle has
-  /// left its way. True: another move has begun.
-  bool advance(double x, double y, double heading, double time) noexcept;
+  /// It ends after the last move, or where the vehicle has left its way. True: another move has begun.
+  bool advance(const Path& path, const Pose& vehicle, double time) noexcept override;
   /// Before each move the reference rests for this share of the time that steering takes, from lock to lock but before
   /// the first one; the rest is steered while it drives.
   static constexpr double standing_share = 0.7;
-  bool waits() const noexcept { return wait_ > 0.0; }
-  double arc_length() const noexcept { return done_; }  ///< where the vehicle is
+  bool waits() const noexcept override { return wait_ > 0.0; }
+  double arc_length() const noexcept override { return done_; }
   /// On the move that is at an arc length, and no further than to its end.
-  double arc_length_after(double arc_length, double time) const noexcept;
-  PathPoint point_at(double arc_length) const noexcept;
+  double arc_length_after(double arc_length, double time) const noexcept override;
+  PathPoint point_at(const Path& path, double arc_length) const noexcept override;
+  double path_beside(const Path& path, double arc_length) const noexcept override;
+  std::optional<double> goes_on_at(const Path& path, double x, double y) const noexcept override;
   /// The place of the path that is closest to one of this way.
   PathProjection beside(const Path& path, double x, double y) const noexcept;
 

@@ -42,6 +42,8 @@ TEST(Approach, LeadsFromTheVehicleToThePathAndGoesOnAsThePath) {
         const PathPoint beyond = approach.point_at(path, approach.target() + 2.0);
         EXPECT_EQ(beyond.x, approach.target() + 2.0);
         EXPECT_EQ(beyond.y, 0.0);
+        EXPECT_NEAR(approach.path_beside(path, approach.arc_length()), 40.0, 1e-9);
+        EXPECT_NEAR(approach.path_beside(path, approach.target()), approach.target(), 1e-9);
         EXPECT_NEAR(approach.arc_length_after(approach.arc_length(), 2.0), approach.arc_length() + 2.0 * speed, 1e-12);
         EXPECT_GE(approach.target(), 40.0) << "nothing is driven twice";
         EXPECT_LT(approach.target(), 40.0 + 8.0 * radius + 1e-9);
@@ -59,30 +61,32 @@ TEST(Approach, MovesOnWithTheVehicleToItsEnd) {
   for (; approach.is_under_way() && steps < 1000; ++steps) {
     // A little beside where it shall be, as one that slips is.
     const PathPoint there = approach.point_at(path, approach.arc_length_after(approach.arc_length(), 0.2));
-    approach.advance(there.x + 0.1, there.y - 0.1, there.heading + 0.3);
+    approach.advance(path, {there.x + 0.1, there.y - 0.1, there.heading + 0.3}, 0.2);
     EXPECT_GE(approach.arc_length(), last);
     EXPECT_LT(approach.arc_length(), last + 0.6 * radius) << "it does not leave an arc out";
     last = approach.arc_length();
   }
   EXPECT_LT(steps, 1000);
   EXPECT_TRUE(approach.has_arrived());
+  EXPECT_EQ(approach.goes_on_at(path, 0.0, 0.0), approach.target());
 }
 
 TEST(Approach, EndsWhereTheVehicleHasLeftIt) {
   const Path path = straight(2.0);
   Approach approach;
   ASSERT_TRUE(approach.begin(path, 0, 40.0, {40.0, 0.0, pi}, turn));
-  approach.advance(40.0, 0.0, pi + 1.4);
+  approach.advance(path, {40.0, 0.0, pi + 1.4}, 0.2);
   EXPECT_TRUE(approach.is_under_way());
-  approach.advance(40.0, 0.0, pi + 1.7);
+  approach.advance(path, {40.0, 0.0, pi + 1.7}, 0.2);
   EXPECT_FALSE(approach.is_under_way());
   EXPECT_FALSE(approach.has_arrived());
   ASSERT_TRUE(approach.begin(path, 0, 40.0, {40.0, 0.0, pi}, turn));
-  approach.advance(40.0, 0.9 * radius, pi);
+  approach.advance(path, {40.0, 0.9 * radius, pi}, 0.2);
   EXPECT_TRUE(approach.is_under_way());
-  approach.advance(40.0 + 3.0 * radius, 0.0, pi);
+  approach.advance(path, {40.0 + 3.0 * radius, 0.0, pi}, 0.2);
   EXPECT_FALSE(approach.is_under_way()) << "it is elsewhere";
   EXPECT_FALSE(approach.has_arrived());
+  EXPECT_EQ(approach.goes_on_at(path, 60.0, 0.0), std::nullopt) << "where it left the path";
 }
 
 TEST(Approach, KeepsToTheRoomBesideThePath) {
