@@ -16,8 +16,6 @@ namespace {
 constexpr int wrong_since[] = {3, 6, 12, 24};
 // Measurements of a disputed position at which that is looked for.
 constexpr int looked_for = 5;
-// Samples that may be replayed for it within one call.
-constexpr int most_replayed = 512;
 // A sensor that is off since then has jumped by at least this share of its innovation at once, as nu' S^-1 nu.
 constexpr double at_once = 0.25;
 // How wrong an angle may have been made by a sensor before it was rejected [rad].

@@ -15,8 +15,6 @@ namespace {
 constexpr int input_wrong_since[] = {2, 4, 8, 16, 32};
 // Failures of a position at which that is looked for.
 constexpr int failures_looked_at = 5;
-// Samples that may be replayed for it within one call.
-constexpr int most_replayed_at_once = 512;
 // So many measurements in a row have to agree with an input again: if it says something else than it did when it was
 // wrong, or what is measured moves, by so many standard deviations; or for longer, for an input that reads zero agrees
 // as long as the vehicle goes straight, too.
@@ -105,7 +103,7 @@ void SensorJudge::as_measured(const Sensor& sensor, double* outputs) const noexc
 bool SensorJudge::is_explained_without_input(const Contradiction& each, WalkingFilter& filter) noexcept {
   int replayed = 0;
   const auto explains = [&](int ago) {
-    if (ago == 0 || memory_->has_gap(ago) || replayed + ago > most_replayed_at_once) return false;
+    if (ago == 0 || memory_->has_gap(ago) || replayed + ago > most_replayed) return false;
     replayed += ago;
     return replay_without_input(each, ago, filter);
   };

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "innovation.hpp"
 #include "sensor_judge_parts.hpp"
@@ -38,32 +39,83 @@ void go_on_from(const WalkingFilter& from, WalkingFilter& filter) noexcept {
 
 }  // namespace
 
-/// What a position disputes has happened since the last one, of which samples of quicker sensors say little.
-void SensorJudge::start(Hypothesis& hypothesis) noexcept {
-  hypothesis.is_active = true;
-  hypothesis.explained = 0;
-  const bool is_slip = &hypothesis == slip_.get();
-  const int back = is_position_disputed() ? memory_->recent->since_position() : 0;
-  if (is_slip) memory_->is_slip_near = back > 0;
+/// What a position disputes has happened since the last one, of which samples of quicker sensors say little: so many
+/// entries ago; 0: it is the last interval.
+int SensorJudge::entries_since_position() noexcept {
+  return is_position_disputed() ? memory_->recent->since_position() : 0;
+}
+
+void SensorJudge::start_slip() noexcept {
+  WalkingFilter& filter = slip_->filter;
+  slip_->is_active = true;
+  slip_->explained = 0;
+  const int back = entries_since_position();
+  memory_->is_slip_near = back > 0;
   if (back > 0) {
-    if (is_slip) {
-      // Over a long interval what a position says of slip is far from linear, unless slip is nearly right already.
-      replay_with_new_slip(back, nullptr);
-      slip_->filter.update(weighed(raw_.data()));
-      memory_->near_slip = slip_->filter.mean().tail(std::ssize(setup_.walk));
-      memory_->slip_beyond = replay_with_new_slip(back, memory_->near_slip.data());
-      return;
-    }
-    memory_->recent->go_back(back, hypothesis.filter);
-    memory_->recent->replay(back, hypothesis.filter, [&](const RecentSamples::Entry& entry) {
-      hypothesis.filter.update(entry.outputs.measured());
-    });
-  } else {
-    hypothesis.filter.mean() = memory_->before_mean;
-    hypothesis.filter.covariance() = memory_->before_covariance;
-    if (is_slip) hypothesis.filter.restart_parameters(setup_.parameter_sigmas);
+    // Over a long interval what a position says of slip is far from linear, unless slip is nearly right already.
+    replay_with_new_slip(back, nullptr);
+    filter.update(weighed(raw_.data()));
+    memory_->near_slip = filter.mean().tail(std::ssize(setup_.walk));
+    memory_->slip_beyond = replay_with_new_slip(back, memory_->near_slip.data());
+    return;
   }
-  hypothesis.filter.predict(is_slip ? input_.data() : believed_input_.data(), memory_->duration);
+  filter.mean() = memory_->before_mean;
+  filter.covariance() = memory_->before_covariance;
+  filter.restart_parameters(setup_.parameter_sigmas);
+  filter.predict(input_.data(), memory_->duration);
+}
+
+void SensorJudge::start_blind() noexcept {
+  blind_->is_active = true;
+  blind_->explained = 0;
+  const int since_believed = is_position_disputed() ? entries_since_believed() : 0;
+  if (since_believed > 0 && replay_blind(since_believed)) {
+    // They count where the dispute about them was cut short, as by a sensor that was found to be off.
+    for (int ago = 0; ago < since_believed && disputed_samples_ == 1; ++ago)
+      blind_->explained += memory_->recent->entry(ago).has_position;
+  } else if (const int back = entries_since_position(); back > 0) {
+    replay_blind(back);
+  } else {
+    blind_->filter.mean() = memory_->before_mean;
+    blind_->filter.covariance() = memory_->before_covariance;
+  }
+  predict_blind(believed_input_.data(), memory_->duration);
+}
+
+/// How many entries there are since the last position that was believed, and of those at least one that was not; 0: too
+/// many, or none.
+int SensorJudge::entries_since_believed() noexcept {
+  RecentSamples& recent = *memory_->recent;
+  const auto is_believed = [&](const RecentSamples::Entry& entry) {
+    for (std::size_t j = 0; j < raw_.size(); ++j)
+      if (!std::isnan(entry.outputs[static_cast<std::ptrdiff_t>(j)]) && sees_position(static_cast<int>(j))) return true;
+    return false;
+  };
+  const int most = std::min(recent.known(), most_replayed);
+  int ago = 0, rejected = 0;
+  for (; ago < most && !is_believed(recent.entry(ago)); ++ago) rejected += recent.entry(ago).has_position;
+  return rejected > 0 && ago < most && !memory_->has_gap(ago) ? ago : 0;
+}
+
+/// Goes through so many entries without knowing the inputs, with positions that were rejected. Whether these pass their
+/// gates: inputs that are wrong may have been so since before the first of them.
+bool SensorJudge::replay_blind(int back) noexcept {
+  RecentSamples& recent = *memory_->recent;
+  WalkingFilter& filter = blind_->filter;
+  bool are_explained = true;
+  recent.go_back(back, filter);
+  for (int ago = back; ago > 0; --ago) {
+    const RecentSamples::Entry& entry = recent.entry(ago - 1);
+    predict_blind(recent.entry(ago).inputs.data(), entry.time - recent.entry(ago).time);
+    filter.expect();
+    for (std::size_t s = 0; s < sensors_.size(); ++s)
+      if (filter.innovation(sensors_[s], entry.rejected.measured(), scratch_))
+        are_explained = are_explained && scratch_.nis <= limits_[static_cast<std::size_t>(scratch_.value.size())];
+    memory_->replayed = entry.outputs;
+    memory_->replayed.add(entry.rejected.measured());
+    filter.update_as_expected(memory_->replayed.measured());
+  }
+  return are_explained;
 }
 
 /// Slip is made anew so many entries ago, near a value (n_p; null: what it was), and what has been measured since used
@@ -241,6 +293,15 @@ bool SensorJudge::is_place_lost() const noexcept {
   return (samples > most || is_long) && is_position_disputed();
 }
 
+/// Whether a sensor of the motion, as a gyro, fails as well as the position, for as long as the proof would take with a
+/// quick receiver.
+bool SensorJudge::is_motion_contradicted() const noexcept {
+  if (!(memory_->now - memory_->disputed_from > Memory::hopeless * setup_.proof * setup_.step)) return false;
+  for (std::size_t s = 0; s < sensors_.size(); ++s)
+    if (records_[s].failures >= suspect_after && !sees_position(sensors_[s].outputs)) return true;
+  return false;
+}
+
 bool SensorJudge::sees_position(const std::vector<int>& outputs) const noexcept {
   return std::ranges::any_of(outputs, [&](int j) { return sees_position(j); });
 }
@@ -294,7 +355,7 @@ double SensorJudge::consider_slip() noexcept {
   double new_likelihood = Memory::unknown;
   if (is_new) {
     memory_->jumps[0] = memory_->recent->keep_newest();
-    start(*slip_);
+    start_slip();
     held_count_ = 0;
     memory_->jump_count = 1;
     const bool explains = disputed_nis(slip_->filter) <= left_unexplained * disputed_nis(own_->filter) &&
@@ -388,7 +449,7 @@ SensorJudge::Finding SensorJudge::settle(double time, const double* outputs) noe
     slip_probability_ = 1.0 / (1.0 + (1.0 / slip_probability_ - 1.0) * std::exp(favours_moved));
   think_again();
   if (!is_blind_) {
-    if (!blind_->is_active) start(*blind_);
+    if (!blind_->is_active) start_blind();
     confront(*blind_, raw_.data(), true);
   }
   // Slip that has jumped shows from the first sample on. Later the filter without the sensor knows so little that new
@@ -440,8 +501,8 @@ SensorJudge::Finding SensorJudge::settle(double time, const double* outputs) noe
     return accept(*moved_);
   }
   // Inputs of which nothing is known explain what any other sensor says. That it is they is to be seen in the motion.
-  if (!is_blind_ && blind_->explained >= setup_.proof && slip_->refuted > 0 && moved_->refuted > 0 &&
-      is_position_disputed()) {
+  if (!is_blind_ && blind_->explained >= (is_motion_contradicted() ? setup_.gap_proof : setup_.proof) &&
+      slip_->refuted > 0 && moved_->refuted > 0 && is_position_disputed()) {
     is_blind_ = true;
     trusted_samples_ = 0;
     for (Record& record : records_) record = {};
@@ -549,13 +610,26 @@ void SensorJudge::end_dispute() noexcept {
   }
 }
 
-/// Whether the measured inputs explain the last interval again.
+/// Whether the measured inputs explain the motion again, over some positions, of which only the first is used: over an
+/// interval, or even since the sample before of a quick sensor, a vehicle hardly moves, whatever its inputs are.
+/// Without positions, the last interval, again and again.
 void SensorJudge::test_inputs(const double* outputs) noexcept {
   WalkingFilter& trial = *memory_->trial;
-  trial.mean() = memory_->before_mean;
-  trial.covariance() = memory_->before_covariance;
+  const int back = memory_->is_counted ? memory_->recent->with_positions_known(trusted_again) : 0;
+  if (back > 0) {
+    bool has_begun = false;
+    memory_->recent->go_back(back, trial);
+    memory_->recent->replay(back, trial, [&](const RecentSamples::Entry& entry) {
+      if (entry.has_position && std::exchange(has_begun, true)) return;
+      trial.update(entry.outputs.measured());
+    });
+  } else {
+    trial.mean() = memory_->before_mean;
+    trial.covariance() = memory_->before_covariance;
+  }
   trial.predict(input_.data(), memory_->duration);
-  trusted_samples_ = fits(trial, outputs) ? trusted_samples_ + memory_->is_counted : 0;
+  const int samples = back > 0 ? trusted_again : trusted_samples_ + memory_->is_counted;
+  trusted_samples_ = fits(trial, outputs) ? samples : 0;
   if (trusted_samples_ >= trusted_again) is_blind_ = false;
 }
 

@@ -170,12 +170,10 @@ WalkingFilter::Setup filter_setup(const SensorJudge::Setup& setup) {
 }
 
 /// Inputs count as typical motion: what is measured of them says nothing.
-WalkingFilter::Setup blind_setup(const Model& model, const SensorJudge::Setup& setup) {
+WalkingFilter::Setup blind_setup(const SensorJudge::Setup& setup, const std::vector<double>& unknown_sigmas) {
   WalkingFilter::Setup blind = filter_setup(setup);
-  const std::vector<Variable>& inputs = model.description().inputs;
-  const std::size_t measured = inputs.size() - model.description().noisy_states.size();
-  for (std::size_t j = 0; j < measured; ++j)
-    blind.noise.input_variances[j] = std::max(blind.noise.input_variances[j], inputs[j].scale * inputs[j].scale);
+  for (std::size_t j = 0; j < unknown_sigmas.size(); ++j)
+    blind.noise.input_variances[j] = std::max(blind.noise.input_variances[j], unknown_sigmas[j] * unknown_sigmas[j]);
   return blind;
 }
 
@@ -209,8 +207,12 @@ SensorJudge::SensorJudge(std::shared_ptr<const Model> model, const Setup& setup)
   edge_ = make(filter_setup(setup_));
   moved_ = make(filter_setup(setup_));
   back_ = make(filter_setup(setup_));
-  blind_ = make(blind_setup(*model, setup_));
   memory_ = std::make_unique<Memory>();
+  const std::size_t measured = model->description().inputs.size() - model->description().noisy_states.size();
+  memory_->unknown_sigmas.assign(model->description().inputs.size(), 0.0);
+  memory_->more_sigmas = memory_->unknown_sigmas;
+  for (std::size_t j = 0; j < measured; ++j) memory_->unknown_sigmas[j] = model->description().inputs[j].scale;
+  blind_ = make(blind_setup(setup_, memory_->unknown_sigmas));
   memory_->double_fault = make(filter_setup(setup_));
   memory_->stuck = StuckValues(setup_.noise.output_variances, outputs_of_motion(*model));
   memory_->trial = std::make_unique<WalkingFilter>(model, filter_setup(setup_));
@@ -263,6 +265,7 @@ void SensorJudge::reset() noexcept {
   states_.assign(sensors_.size(), {});
   findings_.assign(sensors_.size(), 0);
   quiet_.assign(sensors_.size(), 0);
+  quiet_inputs_ = 0;
   records_.assign(sensors_.size(), {});
   excesses_.assign(sensors_.size(), 1.0);
   memory_->accused.assign(sensors_.size(), 0);
@@ -362,7 +365,7 @@ void SensorJudge::advance(double duration, const double* inputs, const double* m
     memory_->offsets->forget_onsets();
     blind_->filter.mean() = own_->filter.mean();
     blind_->filter.covariance() = own_->filter.covariance();
-    blind_->filter.predict(believed_input_.data(), duration);
+    predict_blind(believed_input_.data(), duration);
     own_->filter.mean() = blind_->filter.mean();
     own_->filter.covariance() = blind_->filter.covariance();
   } else {
@@ -376,7 +379,28 @@ void SensorJudge::advance(double duration, const double* inputs, const double* m
   if (back_->is_active) back_->filter.predict(inputs, duration);
   if (memory_->second_thought && memory_->second_thought->is_active())
     memory_->second_thought->predict(inputs, duration);
-  if (blind_->is_active && !is_blind_) blind_->filter.predict(believed_input_.data(), duration);
+  if (blind_->is_active && !is_blind_) predict_blind(believed_input_.data(), duration);
+}
+
+/// Without knowing the inputs. They stay what they are for about as long as it takes from one position to the next:
+/// over that they count as one, however many samples of quicker sensors come meanwhile.
+void SensorJudge::predict_blind(const double* inputs, double duration) noexcept {
+  const double times = position_interval() / std::min(duration, setup_.step);
+  if (!(times > 1.0) || !std::isfinite(times)) {
+    blind_->filter.predict(inputs, duration);
+    return;
+  }
+  for (std::size_t j = 0; j < memory_->unknown_sigmas.size(); ++j)
+    memory_->more_sigmas[j] = memory_->unknown_sigmas[j] * std::sqrt(times - 1.0);
+  blind_->filter.predict(inputs, duration, memory_->more_sigmas.data());
+}
+
+/// From one position to the next, of the quickest receiver [s]; infinite: not known.
+double SensorJudge::position_interval() const noexcept {
+  double quickest = infinity;
+  for (int j = 0; j < static_cast<int>(raw_.size()); ++j)
+    if (sees_position(j)) quickest = std::fmin(quickest, memory_->loss->usual_interval(j));
+  return quickest;
 }
 
 /// Keeps what was known after the last samples, and the mean input since then.
@@ -534,7 +558,9 @@ SensorJudge::Finding SensorJudge::judge_each(double time, double* outputs) noexc
     memory_->offsets->take(filter, std::max(1.0, *std::ranges::max_element(excesses_)),
                            memory_->correlated->by_output(), memory_->is_counted);
     const bool is_told = told >= 0 && memory_->offsets->probable() == told;
-    const bool is_found = !is_disputed && memory_->offsets->has_suspect();
+    // While a position is disputed it is not known yet who is wrong, which is for others to find out.
+    const bool is_open = is_disputed_ && is_place_disputed();
+    const bool is_found = !is_disputed && !is_open && memory_->offsets->has_suspect();
     if (distrust_again()) return slip_is_new;
     if (is_found && distrust_receiver()) return {.rebase = true};
     if (is_told) {
@@ -602,26 +628,29 @@ SensorJudge::Finding SensorJudge::judge(double time, double* outputs, const doub
     if (findings_[s]) states_[s].reasons = findings_[s] | (states_[s].reasons & reason::moved);
   }
   calm_samples_ = is_calm ? calm_samples_ + counted : 0;
-  if ((input_findings_ & ~reason::off) != 0 || (is_input_off && !is_known)) inputs_.reasons = input_findings_;
-  if (calm_samples_ >= setup_.calm) inputs_.reasons = input_findings_ & reason::off;
+  const bool are_inputs_found = (input_findings_ & ~reason::off) != 0 || (is_input_off && !is_known);
+  quiet_inputs_ = are_inputs_found ? 0 : quiet_inputs_ + counted;
+  if (are_inputs_found) inputs_.reasons = input_findings_;
+  forget_reasons();
   input_findings_ = 0;
   if (is_blind_ || (inputs_.reasons & reason::rejected) == 0) doubted_input_ = -1;
-  forget_reasons();
   return finding;
 }
 
-/// What sensors were doubted for is forgotten once they have been quiet, but not all of it before the estimate is calm:
-/// one that is quick is quiet after fewer samples that count.
+/// What sensors and inputs were doubted for is forgotten once they have been quiet, but not all of it before the
+/// estimate is calm: one that is quick is quiet after fewer samples that count.
 void SensorJudge::forget_reasons() noexcept {
   const auto is_over = [&](std::size_t s) {
     const bool has_moved = (states_[s].reasons & reason::moved) != 0;
     return quiet_[s] >= (has_moved && !memory_->was_return ? setup_.calm_after_moving : setup_.calm);
   };
-  bool is_any_left = inputs_.reasons != 0 || calm_samples_ >= setup_.calm;
+  const bool are_inputs_over = quiet_inputs_ >= setup_.calm;
+  bool is_any_left = calm_samples_ >= setup_.calm || (inputs_.reasons != 0 && !are_inputs_over);
   for (std::size_t s = 0; s < sensors_.size(); ++s)
     is_any_left = is_any_left || (states_[s].reasons != 0 && !is_over(s));
   for (std::size_t s = 0; s < sensors_.size() && is_any_left; ++s)
     if (is_over(s)) states_[s].reasons = 0;
+  if (calm_samples_ >= setup_.calm || (is_any_left && are_inputs_over)) inputs_.reasons = input_findings_ & reason::off;
 }
 
 /// Sensors whose values are off by what is known, and taken out of them.
@@ -680,7 +709,6 @@ void SensorJudge::note_corrected(bool has_jumped) noexcept {
 void SensorJudge::remember(double time, const double* outputs) noexcept {
   Memory& memory = *memory_;
   bool has_position = false;
-  double quickest = std::numeric_limits<double>::infinity();
   MeasuredOutputs& rejected = memory.replayed;
   rejected.assign(weighed(raw_.data()));
   rejected.remove(outputs);
@@ -690,9 +718,8 @@ void SensorJudge::remember(double time, const double* outputs) noexcept {
       continue;
     }
     has_position = has_position || !std::isnan(raw_[j]);
-    const double interval = memory.loss->usual_interval(static_cast<int>(j));
-    if (interval < quickest) quickest = interval;
   }
+  const double quickest = position_interval();
   const bool is_known = std::isfinite(quickest);
   memory.recent->join_within(is_known ? std::min(setup_.step, quickest / Memory::most_between_positions) : 0.0);
   memory.contradicting.clear();

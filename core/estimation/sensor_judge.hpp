@@ -87,6 +87,8 @@ class SensorJudge {
   // sensor_judge.cpp
   void note_sample(double time, const double* outputs) noexcept;
   void note_motion(double duration, const double* inputs) noexcept;
+  void predict_blind(const double* inputs, double duration) noexcept;
+  double position_interval() const noexcept;
   void note_offsets() noexcept;
   bool is_minor_offset(std::size_t sensor) const noexcept;
   void note_corrected(bool has_jumped) noexcept;
@@ -120,8 +122,12 @@ class SensorJudge {
 
   // sensor_dispute.cpp: hypotheses of what is wrong, and which of them lasts.
   Finding settle(double time, const double* outputs) noexcept;
-  void start(Hypothesis& hypothesis) noexcept;
+  int entries_since_position() noexcept;
+  int entries_since_believed() noexcept;
+  void start_slip() noexcept;
   void start_moved(Hypothesis& hypothesis) noexcept;
+  void start_blind() noexcept;
+  bool replay_blind(int back) noexcept;
   void begin_edge(bool is_new) noexcept;
   void confront(Hypothesis& hypothesis, const double* outputs, bool counts) noexcept;
   void refute(Hypothesis& hypothesis) noexcept;
@@ -150,6 +156,7 @@ class SensorJudge {
   bool is_place_disputed() const noexcept;
   bool is_position_disputed() const noexcept;
   bool is_place_lost() const noexcept;
+  bool is_motion_contradicted() const noexcept;
   bool is_placed_otherwise() const noexcept;
 
   // sensor_accusation.cpp: a position fails, and another sensor may be wrong that was believed.
@@ -223,6 +230,7 @@ class SensorJudge {
   int unplaced_samples_ = 0;          ///< disputed ones in a row in which no position was used
   int trusted_samples_ = 0;           ///< in a row that fit measured inputs again
   int calm_samples_ = 0;              ///< without a finding, in a row
+  int quiet_inputs_ = 0;              ///< without one of the inputs
   std::vector<SensorHealth> states_;  ///< by sensor
   SensorHealth inputs_;
   int off_input_ = -1;      ///< the one that `inputs_.offset` is of

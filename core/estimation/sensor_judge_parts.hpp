@@ -36,6 +36,8 @@ inline constexpr int suspect_position = 4;
 inline constexpr double close_gate = 3.0;
 // The logarithm of odds that convince: a hundred to one.
 inline constexpr double convincing = 4.6;
+// Samples that one explanation may go through anew within one call.
+inline constexpr int most_replayed = 512;
 // In typical magnitudes, how far off a state can be that is found anew.
 inline constexpr double displacement = 100.0;
 
@@ -153,6 +155,8 @@ struct SensorJudge::Memory {
   std::vector<Doubt> doubts;            ///< n_u
   std::vector<double> measured_inputs;  ///< n_u, of the last message
   std::vector<double> inputs_without;   ///< n_u, for what is tried
+  std::vector<double> unknown_sigmas;   ///< n_u, standard deviations of inputs of which nothing is known
+  std::vector<double> more_sigmas;      ///< n_u, scratch
   std::unique_ptr<InformationLoss> loss;
   std::unique_ptr<WalkingFilter> trial;     ///< for what is tried within one call
   std::unique_ptr<WalkingFilter> ahead;     ///< behind the last sample that was judged
