@@ -45,6 +45,11 @@ struct Columns {
 /// number that is known, so that no library is called for it.
 void clear_behind(int first, int width, int rows, double* matrix, std::ptrdiff_t step) {
   const int first_eight = padded(first);
+  if (first == first_eight && width == first + 8) {
+    for (double* row = matrix + first; rows > 0; --rows, row += step)
+      for (int k = 0; k < 8; ++k) row[k] = 0.0;
+    return;
+  }
   for (double* row = matrix; rows > 0; --rows, row += step) {
     for (int c = first; c < first_eight; ++c) row[c] = 0.0;
     for (int c = first_eight; c < width; c += 8)
@@ -99,8 +104,10 @@ void StateNoiseModel::integrate_in_place(const IntervalRows& request) const noex
   const int nx = state_count(), ni = static_cast<int>(states_.size());
   const int first = nx + vehicle_->parameter_count() + vehicle_->input_count(), width = padded(first + ni);
   const int* const states = states_.data();
+  // Mostly all intervals are as long, and a root takes as long as half of the rest.
+  double duration = 0.0, root = 0.0;
   for (int i = 0; i < request.count; ++i) {
-    const double root = std::sqrt(request.durations[i]);
+    if (request.durations[i] != duration) root = std::sqrt(duration = request.durations[i]);
     if (request.next_states) {
       const double* const noises = request.z + i * request.z_step + first;
       double* const next = request.next_states + i * request.next_step;
