@@ -104,7 +104,7 @@ void StateNoiseModel::integrate_in_place(const IntervalRows& request) const noex
   const int nx = state_count(), ni = static_cast<int>(states_.size());
   const int first = nx + vehicle_->parameter_count() + vehicle_->input_count(), width = padded(first + ni);
   const int* const states = states_.data();
-  // Mostly all intervals are as long, and a root takes as long as half of the rest.
+  // Mostly all intervals are as long.
   double duration = 0.0, root = 0.0;
   for (int i = 0; i < request.count; ++i) {
     if (request.durations[i] != duration) root = std::sqrt(duration = request.durations[i]);
