@@ -74,7 +74,7 @@ void SensorJudge::start_blind() noexcept {
     for (int ago = 0; ago < since_believed && disputed_samples_ == 1; ++ago)
       blind_->explained += memory_->recent->entry(ago).has_position;
   } else if (const int back = entries_since_position(); back > 0) {
-    replay_blind(back);
+    replay_blind(back);  // behind the last position, so that there is none
   } else {
     blind_->filter.mean() = memory_->before_mean;
     blind_->filter.covariance() = memory_->before_covariance;
@@ -97,25 +97,25 @@ int SensorJudge::entries_since_believed() noexcept {
   return rejected > 0 && ago < most && !memory_->has_gap(ago) ? ago : 0;
 }
 
-/// Goes through so many entries without knowing the inputs, with positions that were rejected. Whether these pass their
-/// gates: inputs that are wrong may have been so since before the first of them.
+/// Goes through so many entries without knowing the inputs, with positions that were rejected, as long as these pass
+/// their gates: inputs that are wrong may have been so since before the first of them. Whether all do.
 bool SensorJudge::replay_blind(int back) noexcept {
   RecentSamples& recent = *memory_->recent;
   WalkingFilter& filter = blind_->filter;
-  bool are_explained = true;
   recent.go_back(back, filter);
   for (int ago = back; ago > 0; --ago) {
     const RecentSamples::Entry& entry = recent.entry(ago - 1);
     predict_blind(recent.entry(ago).inputs.data(), entry.time - recent.entry(ago).time);
     filter.expect();
     for (std::size_t s = 0; s < sensors_.size(); ++s)
-      if (filter.innovation(sensors_[s], entry.rejected.measured(), scratch_))
-        are_explained = are_explained && scratch_.nis <= limits_[static_cast<std::size_t>(scratch_.value.size())];
+      if (filter.innovation(sensors_[s], entry.rejected.measured(), scratch_) &&
+          !(scratch_.nis <= limits_[static_cast<std::size_t>(scratch_.value.size())]))
+        return false;
     memory_->replayed = entry.outputs;
     memory_->replayed.add(entry.rejected.measured());
     filter.update_as_expected(memory_->replayed.measured());
   }
-  return are_explained;
+  return true;
 }
 
 /// Slip is made anew so many entries ago, near a value (n_p; null: what it was), and what has been measured since used
